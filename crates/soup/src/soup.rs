@@ -1,0 +1,157 @@
+//! The flattened triangle soup.
+
+use crate::{Material, Texture};
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
+
+/// Triangles with materials: an `f64` origin and `f32` positions about it.
+///
+/// Attribute arrays (`normals`, `uvs`, `colors`) are empty or as long as `positions`.
+#[derive(Clone, Debug, Default)]
+pub struct TriangleSoup {
+    /// World position of the soup's zero.
+    pub origin: DVec3,
+    /// Vertex positions about the origin.
+    pub positions: Vec<Vec3>,
+    /// Vertex normals (unit, or zero where unknown), or empty.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, or empty; v points down.
+    pub uvs: Vec<Vec2>,
+    /// Linear RGBA vertex colours, or empty.
+    pub colors: Vec<[f32; 4]>,
+    /// Vertex indices, three a triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Material of each triangle; as long as `triangles`.
+    pub triangle_materials: Vec<u16>,
+    /// The materials.
+    pub materials: Vec<Material>,
+    /// The textures that materials refer to.
+    pub textures: Vec<Arc<Texture>>,
+}
+
+/// A soup that breaks one of its own rules; the message says which.
+#[derive(Debug, thiserror::Error)]
+#[error("invalid soup: {0}")]
+pub struct InvalidSoup(String);
+
+impl TriangleSoup {
+    /// The corners of triangle `i`.
+    #[inline]
+    pub fn corners(&self, i: usize) -> [Vec3; 3] {
+        self.triangles[i].map(|v| self.positions[v as usize])
+    }
+
+    /// Checks lengths, indices and material references. Positions may still be non-finite: bakers
+    /// drop such triangles and count them.
+    ///
+    /// # Errors
+    /// The first broken rule, with the element and the limit.
+    pub fn validate(&self) -> Result<(), InvalidSoup> {
+        let n = self.positions.len();
+        let fail = |m: String| Err(InvalidSoup(m));
+        for (name, len) in
+            [("normals", self.normals.len()), ("uvs", self.uvs.len()), ("colors", self.colors.len())]
+        {
+            if len != 0 && len != n {
+                return fail(format!("{len} {name} for {n} positions"));
+            }
+        }
+        if self.triangle_materials.len() != self.triangles.len() {
+            let (m, t) = (self.triangle_materials.len(), self.triangles.len());
+            return fail(format!("{m} material indices for {t} triangles"));
+        }
+        if let Some(t) = self.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= n)) {
+            return fail(format!("triangle {t} uses vertices {:?} of {n}", self.triangles[t]));
+        }
+        let m = self.materials.len();
+        if let Some(t) = self.triangle_materials.iter().position(|&x| x as usize >= m) {
+            return fail(format!("triangle {t} uses material {} of {m}", self.triangle_materials[t]));
+        }
+        for (i, material) in self.materials.iter().enumerate() {
+            if material.texture.is_some_and(|t| t as usize >= self.textures.len()) {
+                let t = self.textures.len();
+                return fail(format!("material {i} uses texture {:?} of {t}", material.texture));
+            }
+        }
+        for texture in &self.textures {
+            let (w, h, have) = (texture.width, texture.height, texture.texels.len());
+            if w == 0 || h == 0 || have as u64 != u64::from(w) * u64::from(h) {
+                return fail(format!("texture {:?} is {w}×{h} with {have} texels", texture.name));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An axis-aligned box in the soup's space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner.
+    pub min: DVec3,
+    /// Largest corner.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// Contains nothing; any union replaces it.
+    pub const EMPTY: Self =
+        Self { min: DVec3::splat(f64::INFINITY), max: DVec3::splat(f64::NEG_INFINITY) };
+
+    /// The smallest box around both.
+    pub fn union(self, o: Self) -> Self {
+        Self { min: self.min.min(o.min), max: self.max.max(o.max) }
+    }
+
+    /// The smallest box around this one and a point.
+    pub fn with(self, p: DVec3) -> Self {
+        Self { min: self.min.min(p), max: self.max.max(p) }
+    }
+
+    /// Whether nothing was ever put in.
+    pub fn is_empty(&self) -> bool {
+        self.min.x > self.max.x
+    }
+
+    /// The middle.
+    pub fn center(&self) -> DVec3 {
+        (self.min + self.max) * 0.5
+    }
+
+    /// Edge lengths.
+    pub fn size(&self) -> DVec3 {
+        self.max - self.min
+    }
+
+    /// Half the diagonal: the radius of the sphere around the box.
+    pub fn half_diagonal(&self) -> f64 {
+        self.size().length() * 0.5
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn validate_names_the_element_and_the_limit() {
+        let good = TriangleSoup {
+            positions: vec![Vec3::ZERO; 3],
+            triangles: vec![[0, 1, 2]],
+            triangle_materials: vec![0],
+            materials: vec![Material::default()],
+            ..TriangleSoup::default()
+        };
+        good.validate().unwrap();
+        let broken = |change: fn(&mut TriangleSoup), want: &str| {
+            let mut s = good.clone();
+            change(&mut s);
+            let e = s.validate().unwrap_err().to_string();
+            assert!(e.contains(want), "{e}");
+        };
+        broken(|s| s.triangles.push([0, 1, 3]), "1 material indices for 2 triangles");
+        broken(|s| s.triangles[0][1] = 7, "triangle 0 uses vertices [0, 7, 2] of 3");
+        broken(|s| s.triangle_materials[0] = 2, "triangle 0 uses material 2 of 1");
+        broken(|s| s.uvs.push(Vec2::ZERO), "1 uvs for 3 positions");
+        broken(|s| s.materials[0].texture = Some(4), "material 0 uses texture Some(4) of 0");
+    }
+}

@@ -1,0 +1,55 @@
+//! The registry of section kinds. Numbers are for ever; a new layout gets a new number.
+
+/// What was baked from what: [`crate::header::Meta`].
+pub const META: u16 = 1;
+/// Header of the points representation (owner: `forest-points`).
+pub const POINTS_HEADER: u16 = 16;
+/// Cell table, 64 bytes a cell.
+pub const POINTS_CELLS: u16 = 17;
+/// Point records, 16 bytes a point.
+pub const POINTS: u16 = 18;
+/// Triangle records, 40 bytes a triangle.
+pub const POINTS_TRIANGLES: u16 = 19;
+/// Vertex colours of those triangles, 12 bytes a triangle.
+pub const POINTS_TRIANGLE_COLORS: u16 = 20;
+/// Materials and the list of textures: [`crate::header::Materials`].
+pub const MATERIALS: u16 = 32;
+/// Texels of one texture, RGBA, 8 bits each; the index is the texture's number.
+pub const TEXTURE: u16 = 33;
+
+/// Name of a kind for people; unknown kinds are named by number.
+pub fn name(kind: u16) -> String {
+    match kind {
+        META => "meta".into(),
+        POINTS_HEADER => "points.header".into(),
+        POINTS_CELLS => "points.cells".into(),
+        POINTS => "points".into(),
+        POINTS_TRIANGLES => "points.triangles".into(),
+        POINTS_TRIANGLE_COLORS => "points.triangle-colors".into(),
+        MATERIALS => "materials".into(),
+        TEXTURE => "texture".into(),
+        other => format!("kind-{other}"),
+    }
+}
+
+/// Names one section: its kind, and which of that kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SectionId {
+    /// One of this module's constants.
+    pub kind: u16,
+    /// Number within the kind; 0 where there is only one.
+    pub index: u32,
+}
+
+impl SectionId {
+    /// Section `index` of `kind`.
+    pub const fn new(kind: u16, index: u32) -> Self {
+        Self { kind, index }
+    }
+}
+
+impl std::fmt::Display for SectionId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}[{}]", name(self.kind), self.index)
+    }
+}

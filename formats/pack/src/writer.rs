@@ -1,0 +1,164 @@
+//! Writing: beside the target, then renamed over it.
+
+use crate::layout::{
+    ALIGNMENT, Codec, FileHeader, MAGIC, TableEntry, VERSION, section_hash, table_hash,
+};
+use crate::{Pack, PackError, SectionId, Spool};
+use bytemuck::Zeroable;
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// zstd level: higher ones gain almost nothing on texels and cost ten times the time.
+const ZSTD_LEVEL: i32 = 1;
+
+/// Writes a pack to a temporary file beside its target; [`PackWriter::finish`] renames it. Dropped
+/// before that, it leaves nothing.
+pub struct PackWriter {
+    target: PathBuf,
+    out: BufWriter<NamedTempFile>,
+    position: u64,
+    table: Vec<TableEntry>,
+}
+
+impl PackWriter {
+    /// Starts a pack that will replace `target`.
+    ///
+    /// # Errors
+    /// When the folder cannot be written.
+    pub fn create(target: &Path) -> Result<Self, PackError> {
+        let folder = match target.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p,
+            _ => Path::new("."),
+        };
+        let file = tempfile::Builder::new()
+            .prefix(".fpack-")
+            .tempfile_in(folder)
+            .map_err(PackError::io(target, "cannot create a file beside it"))?;
+        let mut writer = Self {
+            target: target.into(),
+            out: BufWriter::with_capacity(1 << 20, file),
+            position: 0,
+            table: Vec::new(),
+        };
+        writer.put(&[0; size_of::<FileHeader>()])?;
+        Ok(writer)
+    }
+
+    /// Adds a section. Ids must be new to the pack.
+    ///
+    /// # Errors
+    /// When the id is taken or the disk is full.
+    pub fn add(&mut self, id: SectionId, codec: Codec, data: &[u8]) -> Result<(), PackError> {
+        let packed;
+        let stored = match codec {
+            Codec::None => data,
+            Codec::Zstd => {
+                packed = zstd::bulk::compress(data, ZSTD_LEVEL)
+                    .map_err(PackError::io(&self.target, "zstd failed"))?;
+                &packed
+            }
+        };
+        self.begin(id, codec, stored.len() as u64, data.len() as u64, section_hash(stored))?;
+        self.put(stored)
+    }
+
+    /// Adds a section that was written piece by piece.
+    ///
+    /// # Errors
+    /// When the id is taken or the disk is full.
+    pub fn add_spool(&mut self, id: SectionId, mut spool: Spool) -> Result<(), PackError> {
+        self.begin(id, Codec::None, spool.len(), spool.len(), spool.hash())?;
+        spool.copy_to(&mut self.out).map_err(PackError::io(&self.target, "cannot write"))?;
+        self.position += spool.len();
+        Ok(())
+    }
+
+    /// Copies a section of another pack as it is stored there.
+    ///
+    /// # Errors
+    /// When the source section is damaged, the id is taken or the disk is full.
+    pub fn copy(&mut self, from: &Pack, id: SectionId) -> Result<(), PackError> {
+        let (section, stored) = from.stored(id)?;
+        let length = section.length;
+        self.begin(id, section.codec, stored.len() as u64, length, section_hash(stored))?;
+        self.put(stored)
+    }
+
+    /// Writes the table and the header, and renames the file over its target.
+    ///
+    /// # Errors
+    /// When the disk is full or the rename fails; the target is then as it was.
+    pub fn finish(mut self) -> Result<(), PackError> {
+        self.align()?;
+        let table_offset = self.position;
+        let table = std::mem::take(&mut self.table);
+        let table_bytes: &[u8] = bytemuck::cast_slice(&table);
+        self.put(table_bytes)?;
+        let mut header = FileHeader {
+            magic: MAGIC,
+            version: VERSION,
+            sections: table.len() as u32,
+            file_length: self.position,
+            table_offset,
+            hash: [0; 32],
+        };
+        header.hash = table_hash(&header, table_bytes);
+        let failed = |e| PackError::io(&self.target, "cannot write")(e);
+        self.out.seek(SeekFrom::Start(0)).map_err(failed)?;
+        self.out.write_all(bytemuck::bytes_of(&header)).map_err(failed)?;
+        let file = self.out.into_inner().map_err(|e| failed(e.into_error()))?;
+        keep_usual_permissions(file.as_file()).map_err(failed)?;
+        file.persist(&self.target)
+            .map_err(|e| PackError::io(&self.target, "cannot rename the finished file")(e.error))?;
+        Ok(())
+    }
+
+    fn begin(
+        &mut self,
+        id: SectionId,
+        codec: Codec,
+        stored_length: u64,
+        length: u64,
+        hash: [u8; crate::layout::ENTRY_HASH],
+    ) -> Result<(), PackError> {
+        if self.table.iter().any(|e| (e.kind, e.index) == (id.kind, id.index)) {
+            return Err(PackError::invalid(&self.target, id, "the section was already written"));
+        }
+        self.align()?;
+        self.table.push(TableEntry {
+            kind: id.kind,
+            codec: codec.code(),
+            index: id.index,
+            offset: self.position,
+            stored_length,
+            length,
+            hash,
+            ..TableEntry::zeroed()
+        });
+        Ok(())
+    }
+
+    fn align(&mut self) -> Result<(), PackError> {
+        let padding = self.position.next_multiple_of(ALIGNMENT) - self.position;
+        self.put(&[0; ALIGNMENT as usize][..padding as usize])
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<(), PackError> {
+        self.position += bytes.len() as u64;
+        self.out.write_all(bytes).map_err(PackError::io(&self.target, "cannot write"))
+    }
+}
+
+/// Temporary files are private (0600); a finished pack is as readable as any new file.
+#[cfg(unix)]
+fn keep_usual_permissions(file: &File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn keep_usual_permissions(_: &File) -> std::io::Result<()> {
+    Ok(())
+}
