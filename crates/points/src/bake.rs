@@ -1,0 +1,328 @@
+//! The bake: soup → sections of a pack, cell by cell.
+
+use crate::cell::{self, BakedCell, CellBaker};
+use crate::cluster::{self, Leaves};
+use crate::frame::BlockFrame;
+use crate::grid::CellLists;
+use crate::header::{BakeCounts, CellRecord, PointsHeader};
+use crate::lattice::Lattice;
+use crate::materials::write_materials;
+use crate::node::Node;
+use crate::options::{BakeOptions, Order};
+use crate::size::SizeCode;
+use crate::surfel::{SurfelMaker, SurfelShader};
+use crate::timing::StageTimes;
+use crate::triangle::TriangleEncoder;
+use forest_pack::{Codec, PackError, PackWriter, SectionId, Spool, header, kind};
+use forest_soup::{Bounds, InvalidSoup, TriangleSoup};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::io::Write;
+use std::path::Path;
+
+/// Source triangles whose cells are baked before they are written: bounds the memory of a bake.
+const BATCH: usize = 1 << 20;
+
+/// Why a soup could not be baked.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// The soup breaks its own rules.
+    #[error(transparent)]
+    Soup(#[from] InvalidSoup),
+    /// No triangle is left.
+    #[error("no visible triangle: {0}")]
+    NothingVisible(BakeCounts),
+    /// More points than a 32-bit index can name.
+    #[error("the bake makes {0} points; the limit is {max} (use a larger --surfel-size)", max = u32::MAX)]
+    TooManyPoints(u64),
+    /// An option that makes no sense.
+    #[error("{option} is {value}; it must be {rule}")]
+    Option {
+        /// Its name on the command line.
+        option: &'static str,
+        /// What it was set to.
+        value: String,
+        /// What it may be.
+        rule: &'static str,
+    },
+    /// The pack could not be written.
+    #[error(transparent)]
+    Pack(#[from] PackError),
+}
+
+/// What a bake did.
+#[derive(Clone, Debug)]
+pub struct BakeReport {
+    /// The header that was written.
+    pub header: PointsHeader,
+    /// Cells with points in them.
+    pub cells: usize,
+    /// Where the time went.
+    pub times: StageTimes,
+}
+
+/// Bakes `soup` and adds the sections of the points representation to `writer`. `progress` is told
+/// how many of the source's triangles are done.
+///
+/// The same soup and options give the same bytes, whatever the number of threads.
+///
+/// # Errors
+/// When the soup is invalid or nothing of it is visible, or the pack cannot be written.
+pub fn bake(
+    soup: &TriangleSoup,
+    options: &BakeOptions,
+    writer: &mut PackWriter,
+    progress: &dyn Fn(u64),
+) -> Result<BakeReport, BakeError> {
+    let ready = Preparation::new(soup, options)?;
+    let mut times = ready.times;
+    let shader = times.shade.time(|| ready.shader());
+    let Preparation { frame, lists, baker, mut counts, .. } = ready;
+    let uv_ranges = baker.encoder.as_ref().map_or(vec![], |e| e.uv_ranges.clone());
+
+    let mut sections = Sections::default();
+    let mut done = 0u64;
+    for batch in batches(&lists) {
+        let baked: Vec<_> = batch
+            .clone()
+            .into_par_iter()
+            .map_init(
+                || SurfelMaker::new(&shader),
+                |maker, c| {
+                    let mut counts = BakeCounts::default();
+                    let mut times = StageTimes::default();
+                    let cell = baker.bake(lists.of(c), maker, &mut counts, &mut times);
+                    (cell, counts, times)
+                },
+            )
+            .collect();
+        for (c, (cell, cell_counts, cell_times)) in batch.zip(baked) {
+            counts.add(&cell_counts);
+            times.add(&cell_times);
+            if let Some(cell) = cell {
+                times.write.time(|| sections.push(c as u32, cell))?;
+            }
+            done += lists.of(c).len() as u64;
+            progress(done);
+        }
+    }
+    if sections.cells.is_empty() {
+        return Err(BakeError::NothingVisible(counts));
+    }
+    counts.points += sections.push_top(&baker)?;
+    let header = PointsHeader {
+        origin: (soup.origin + frame.center).to_array(),
+        exponent: frame.exponent,
+        step_exponent: baker.lattice.exponent,
+        min: frame.bounds.min.to_array(),
+        max: frame.bounds.max.to_array(),
+        grid: lists.dims,
+        order: options.order,
+        radius: options.radius,
+        surfel_size: shader.size(),
+        alpha_tolerance: options.alpha_tolerance,
+        counts,
+        uv_ranges,
+    };
+    let cells = sections.roots.len();
+    times.write.time(|| {
+        sections.write(&header, writer)?;
+        if options.triangles {
+            write_materials(writer, &soup.materials, &soup.textures)?;
+        }
+        Ok::<_, BakeError>(())
+    })?;
+    Ok(BakeReport { header, cells, times })
+}
+
+/// What comes before the first cell.
+pub(crate) struct Preparation<'a> {
+    frame: BlockFrame,
+    pub(crate) lists: CellLists,
+    pub(crate) baker: CellBaker<'a>,
+    counts: BakeCounts,
+    times: StageTimes,
+}
+
+impl<'a> Preparation<'a> {
+    pub(crate) fn new(
+        soup: &'a TriangleSoup,
+        options: &'a BakeOptions,
+    ) -> Result<Self, BakeError> {
+        check(options)?;
+        soup.validate()?;
+        let mut times = StageTimes::default();
+        let mut counts =
+            BakeCounts { source_triangles: soup.triangles.len() as u64, ..Default::default() };
+        let Some((frame, lists)) = times.grid.time(|| {
+            let frame = BlockFrame::of(soup)?;
+            Some((frame, CellLists::new(soup, &frame, options.grid)))
+        }) else {
+            return Err(BakeError::NothingVisible(count_unusable(soup, counts)));
+        };
+        counts.non_finite = lists.non_finite;
+        let encoder =
+            times.triangles.time(|| options.triangles.then(|| TriangleEncoder::new(soup, frame)));
+        let lattice = Lattice { exponent: 0 };
+        let mut baker = CellBaker { soup, frame, lattice, options, encoder };
+        baker.lattice = times.grid.time(|| {
+            let extents = (0..lists.len()).into_par_iter().map(|c| {
+                let b = baker.bounds(lists.of(c));
+                if b.is_empty() { 0.0 } else { b.size().max_element() }
+            });
+            Lattice::for_extent(extents.reduce(|| 0.0, f64::max))
+        });
+        Ok(Self { frame, lists, baker, counts, times })
+    }
+
+    pub(crate) fn shader(&self) -> SurfelShader<'a> {
+        SurfelShader::new(self.baker.soup, self.frame, self.baker.options)
+    }
+}
+
+fn check(options: &BakeOptions) -> Result<(), BakeError> {
+    let fail = |option, value: String, rule| Err(BakeError::Option { option, value, rule });
+    if let crate::SurfelSize::Units(s) = options.surfel_size
+        && !(s.is_finite() && s > 0.0)
+    {
+        return fail("--surfel-size", s.to_string(), "a positive length");
+    }
+    let t = options.alpha_tolerance;
+    if !(0.0..=1.0).contains(&t) {
+        return fail("--alpha-tolerance", t.to_string(), "between 0 and 1");
+    }
+    if let crate::GridChoice::Fixed(n) = options.grid
+        && (n.contains(&0) || n.iter().map(|&n| u64::from(n)).product::<u64>() > 1 << 20)
+    {
+        return fail("--grid", format!("{n:?}"), "at least 1 along each axis and 2^20 cells in all");
+    }
+    Ok(())
+}
+
+/// Counts of a soup that has no extent at all.
+fn count_unusable(soup: &TriangleSoup, mut counts: BakeCounts) -> BakeCounts {
+    let finite = |i: usize| soup.corners(i).iter().all(|p| p.is_finite());
+    counts.non_finite = (0..soup.triangles.len()).filter(|&i| !finite(i)).count() as u64;
+    counts.zero_area = counts.source_triangles - counts.non_finite;
+    counts
+}
+
+/// Ranges of cells with at most [`BATCH`] triangles each (or one cell).
+fn batches(lists: &CellLists) -> Vec<std::ops::Range<usize>> {
+    let mut ranges = Vec::new();
+    let mut start = 0;
+    for c in 0..lists.len() {
+        let size = lists.starts[c + 1] - lists.starts[start];
+        if size as usize > BATCH && c > start {
+            ranges.push(start..c);
+            start = c;
+        }
+    }
+    ranges.push(start..lists.len());
+    ranges
+}
+
+/// The sections as they grow.
+#[derive(Default)]
+struct Sections {
+    cells: Vec<CellRecord>,
+    roots: Vec<Node>,
+    bounds: Vec<Bounds>,
+    points: Spool,
+    triangles: Spool,
+    colors: Spool,
+    point_count: u64,
+    triangle_count: u64,
+}
+
+impl Sections {
+    fn push(&mut self, grid_index: u32, cell: BakedCell) -> Result<(), BakeError> {
+        let center = cell.bounds.center();
+        let record = CellRecord {
+            origin: cell.quantiser.origin,
+            first_point: self.point_count as u32,
+            points: cell.points.len() as u32,
+            first_triangle: self.triangle_count as u32,
+            triangles: cell.triangles.len() as u32,
+            center: center.as_vec3().to_array(),
+            radius: cell.bounds.half_diagonal() as f32,
+            root_parent: SizeCode::INFINITE.bits(),
+            top: 0,
+            grid_index,
+            surfels: cell.surfels,
+            step_shift: cell.quantiser.shift,
+            reserved: 0,
+        };
+        self.point_count += cell.points.len() as u64;
+        self.triangle_count += cell.triangles.len() as u64;
+        if self.point_count > u64::from(u32::MAX) {
+            return Err(BakeError::TooManyPoints(self.point_count));
+        }
+        self.cells.push(record);
+        self.roots.push(cell.root);
+        self.bounds.push(cell.bounds);
+        put(&mut self.points, bytemuck::cast_slice(&cell.points))?;
+        put(&mut self.triangles, bytemuck::cast_slice(&cell.triangles))?;
+        put(&mut self.colors, bytemuck::cast_slice(&cell.colors))
+    }
+
+    /// Builds the block's tree over the cells' roots; returns its number of points. The paper's
+    /// order has no such tree: its last row is empty.
+    fn push_top(&mut self, baker: &CellBaker) -> Result<u64, BakeError> {
+        let bounds = self.bounds.iter().fold(Bounds::EMPTY, |all, &b| all.union(b));
+        let quantiser = baker.lattice.quantiser(bounds);
+        let mut points = Vec::new();
+        if baker.options.order == Order::Exact {
+            let rules = baker.rules(Leaves::Roots(&self.roots), quantiser);
+            let parents = cluster::build_top(&self.roots, &rules, &mut points);
+            for (cell, parent) in self.cells.iter_mut().zip(parents) {
+                cell.root_parent = parent.bits();
+            }
+            points = cell::sort(&points, baker.options.order);
+        }
+        self.cells.push(CellRecord {
+            origin: quantiser.origin,
+            first_point: self.point_count as u32,
+            points: points.len() as u32,
+            first_triangle: self.triangle_count as u32,
+            triangles: 0,
+            center: DVec3::ZERO.as_vec3().to_array(),
+            radius: bounds.half_diagonal() as f32,
+            root_parent: SizeCode::INFINITE.bits(),
+            top: 1,
+            grid_index: u32::MAX,
+            surfels: 0,
+            step_shift: quantiser.shift,
+            reserved: 0,
+        });
+        self.point_count += points.len() as u64;
+        put(&mut self.points, bytemuck::cast_slice(&points))?;
+        Ok(points.len() as u64)
+    }
+
+    fn write(self, header: &PointsHeader, writer: &mut PackWriter) -> Result<(), PackError> {
+        let id = |kind| SectionId::new(kind, 0);
+        writer.add(id(kind::POINTS_HEADER), Codec::None, &header::encode(header))?;
+        let cells: &[u8] = bytemuck::cast_slice(&self.cells);
+        writer.add(id(kind::POINTS_CELLS), Codec::None, cells)?;
+        writer.add_spool(id(kind::POINTS), self.points)?;
+        if !self.triangles.is_empty() {
+            writer.add_spool(id(kind::POINTS_TRIANGLES), self.triangles)?;
+        }
+        if !self.colors.is_empty() {
+            writer.add_spool(id(kind::POINTS_TRIANGLE_COLORS), self.colors)?;
+        }
+        Ok(())
+    }
+}
+
+fn put(spool: &mut Spool, bytes: &[u8]) -> Result<(), BakeError> {
+    spool.write_all(bytes).map_err(|source| {
+        BakeError::Pack(PackError::Io {
+            file: Path::new("temporary file of the bake").into(),
+            action: "cannot write",
+            source,
+        })
+    })
+}

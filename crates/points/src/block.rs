@@ -1,0 +1,89 @@
+//! Reading the points of a pack.
+
+use crate::header::{CellRecord, PointsHeader};
+use crate::record::PointRecord;
+use crate::triangle::TriangleRecord;
+use forest_pack::{Pack, PackError, SectionId, header, kind};
+use glam::DVec3;
+
+/// The points representation of a pack, its arrays in place in the memory map.
+#[derive(Clone, Debug)]
+pub struct PointsBlock<'a> {
+    /// The header.
+    pub header: PointsHeader,
+    /// The cells; the last one is the block's own tree.
+    pub cells: &'a [CellRecord],
+    /// All points, cell by cell.
+    pub points: &'a [PointRecord],
+    /// All triangles, cell by cell; empty if the pack has none.
+    pub triangles: &'a [TriangleRecord],
+    /// Vertex colours of the triangles (sRGB and alpha), or empty.
+    pub triangle_colors: &'a [[[u8; 4]; 3]],
+}
+
+impl<'a> PointsBlock<'a> {
+    /// Reads and validates ([`crate::validate()`]) the representation.
+    ///
+    /// # Errors
+    /// When a section is missing or damaged, or breaks a rule of SPEC.md.
+    pub fn open(pack: &'a Pack) -> Result<Self, PackError> {
+        let id = |kind| SectionId::new(kind, 0);
+        let (triangles, colors) = (id(kind::POINTS_TRIANGLES), id(kind::POINTS_TRIANGLE_COLORS));
+        let block = Self {
+            header: header::decode(pack, id(kind::POINTS_HEADER))?,
+            cells: pack.records(id(kind::POINTS_CELLS))?,
+            points: pack.records(id(kind::POINTS))?,
+            triangles: if pack.contains(triangles) { pack.records(triangles)? } else { &[] },
+            triangle_colors: if pack.contains(colors) { pack.records(colors)? } else { &[] },
+        };
+        crate::validate(&block).map_err(|(kind, problem)| {
+            PackError::invalid(pack.path(), SectionId::new(kind, 0), problem)
+        })?;
+        Ok(block)
+    }
+
+    /// Whether a pack holds this representation.
+    pub fn is_in(pack: &Pack) -> bool {
+        pack.contains(SectionId::new(kind::POINTS_HEADER, 0))
+    }
+
+    /// World units in a block unit.
+    pub fn scale(&self) -> f64 {
+        f64::from(self.header.exponent).exp2()
+    }
+
+    /// World position of the block's centre.
+    pub fn origin(&self) -> DVec3 {
+        DVec3::from_array(self.header.origin)
+    }
+
+    /// World position of a point in block space.
+    pub fn to_world(&self, block: DVec3) -> DVec3 {
+        self.origin() + block * self.scale()
+    }
+
+    /// Half the diagonal of the source's box, in world units: the paper's block size R.
+    pub fn half_diagonal(&self) -> f64 {
+        let size = DVec3::from_array(self.header.max) - DVec3::from_array(self.header.min);
+        size.length() * 0.5 * self.scale()
+    }
+
+    /// Position in block space of quantised steps in a cell.
+    pub fn position(&self, cell: &CellRecord, steps: [u16; 3]) -> DVec3 {
+        let step = f64::from(self.header.step_exponent).exp2();
+        let shifted = f64::from(1u32 << cell.step_shift);
+        DVec3::from_array(std::array::from_fn(|k| {
+            (f64::from(cell.origin[k]) + f64::from(steps[k]) * shifted) * step
+        }))
+    }
+
+    /// The points of a cell.
+    pub fn cell_points(&self, cell: &CellRecord) -> &'a [PointRecord] {
+        &self.points[cell.first_point as usize..][..cell.points as usize]
+    }
+
+    /// The triangles of a cell.
+    pub fn cell_triangles(&self, cell: &CellRecord) -> &'a [TriangleRecord] {
+        &self.triangles[cell.first_triangle as usize..][..cell.triangles as usize]
+    }
+}

@@ -1,0 +1,183 @@
+//! Selection: what to draw of a block for a camera (Gilet et al. 2005, sections 5.1 and 5.2).
+//!
+//! Every cell gets two size codes from the thresholds at its distance: `fine` (from s_m) and
+//! `coarse` (from s_M). Then, with integer comparisons only,
+//!
+//! * a triangle is drawn iff `size > coarse`;
+//! * a surfel is drawn iff `parent > fine` and `own ≤ coarse`;
+//! * a cluster's point is drawn iff `parent > fine` and `own ≤ fine`.
+//!
+//! Sizes grow towards the root, and a triangle has the size of its surfels, so that for any
+//! thresholds every source triangle is represented exactly once. Points being sorted by their
+//! parent's size, the first two words of each rule are a prefix of the cell's array.
+//!
+//! The block's own tree above the cells uses the threshold at the block's centre. A cell whose
+//! root's parent is drawn, or below a drawn point, is left out; any other cell's threshold is kept
+//! below that parent, so that the cut is valid across cells that choose differently.
+
+use crate::block::PointsBlock;
+use crate::header::CellRecord;
+use crate::options::Order;
+use crate::record::PointRecord;
+use crate::size::SizeCode;
+use forest_soup::{Camera, Projection};
+use glam::DVec3;
+use std::ops::Range;
+
+/// An area on screen, in square pixels.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Default)]
+pub struct PixelArea(pub f64);
+
+/// What may be drawn how large. All are projected areas ("projected surface", section 5.1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thresholds {
+    /// s_m: points smaller than this give way to their parent.
+    pub finest: PixelArea,
+    /// s_M: points larger than this give way to their triangle. At least s_m is used.
+    pub largest: PixelArea,
+    /// k: both are raised by k·Z, Z going from −1 at the block's front to 1 at its back.
+    pub depth_bias: PixelArea,
+}
+
+impl Default for Thresholds {
+    /// Points of about a pixel, triangles above 16 pixels, no bias.
+    fn default() -> Self {
+        Self { finest: PixelArea(1.0), largest: PixelArea(16.0), depth_bias: PixelArea(0.0) }
+    }
+}
+
+/// What to draw of one cell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CellCut {
+    /// Index of the cell.
+    pub cell: u32,
+    /// Points to look at: indices into the block's array.
+    pub points: Range<u32>,
+    /// Triangles to draw: indices into the block's array.
+    pub triangles: Range<u32>,
+    /// Largest size code of a cluster's point; −1 draws none.
+    pub fine: i32,
+    /// Largest size code of a surfel; −1 draws none.
+    pub coarse: i32,
+    order: Order,
+}
+
+impl CellCut {
+    /// Whether a point of [`CellCut::points`] is drawn.
+    #[inline]
+    pub fn draws(&self, point: &PointRecord) -> bool {
+        let own = i32::from(point.own().bits());
+        match self.order {
+            Order::Exact => own <= if point.is_leaf() { self.coarse } else { self.fine },
+            Order::Paper => true,
+        }
+    }
+}
+
+/// What to draw of a block.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Cut {
+    /// Cells with something to draw.
+    pub cells: Vec<CellCut>,
+}
+
+impl Cut {
+    /// The drawn points: index in the block, cell and record.
+    pub fn points<'a>(
+        &'a self,
+        block: &'a PointsBlock<'a>,
+    ) -> impl Iterator<Item = (u32, &'a CellRecord, &'a PointRecord)> {
+        self.cells.iter().flat_map(move |c| {
+            let cell = &block.cells[c.cell as usize];
+            let records = &block.points[c.points.start as usize..c.points.end as usize];
+            let drawn = (c.points.clone()).zip(records).filter(|(_, p)| c.draws(p));
+            drawn.map(move |(i, p)| (i, cell, p))
+        })
+    }
+
+    /// Number of triangles to draw.
+    pub fn triangle_count(&self) -> u64 {
+        self.cells.iter().map(|c| c.triangles.len() as u64).sum()
+    }
+}
+
+/// What to draw of `block` for `camera`.
+pub fn select(block: &PointsBlock, camera: &Camera, thresholds: &Thresholds) -> Cut {
+    let mut cut = Cut::default();
+    select_into(block, camera, thresholds, &mut cut);
+    cut
+}
+
+/// As [`select`], into a cut that is kept from frame to frame: allocates nothing once it has grown.
+pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &mut Cut) {
+    cut.cells.clear();
+    let scale = block.scale();
+    let distance = |p: DVec3| match camera.projection {
+        Projection::Orthographic { .. } => (p - camera.eye).dot(camera.forward),
+        Projection::Perspective { .. } => p.distance(camera.eye),
+    };
+    // Projected area to area in block space.
+    let to_block = |area: f64, d: f64| {
+        let pixels = camera.pixels_per_unit(d) * scale;
+        area.max(0.0) / (pixels * pixels)
+    };
+    let d1 = distance(block.origin());
+    let block_fine = code(SizeCode::at_most(to_block(t.finest.0, d1)));
+    for (i, cell) in (0..).zip(block.cells) {
+        let [x, y, z] = cell.center.map(f64::from);
+        let d2 = distance(block.to_world(DVec3::new(x, y, z)));
+        let root_parent = i32::from(cell.root_parent);
+        let exact = block.header.order == Order::Exact;
+        if exact && !cell.is_top() && root_parent <= block_fine {
+            continue;
+        }
+        let depth = if cell.is_top() { 0.0 } else { (d2 - d1) / block.half_diagonal() };
+        let bias = t.depth_bias.0 * depth;
+        let fine_area = to_block(t.finest.0 + bias, d2);
+        let coarse_area = to_block(t.largest.0 + bias, d2).max(fine_area);
+        let coarse = code(SizeCode::at_most(coarse_area));
+        let (fine, points) = match block.header.order {
+            Order::Exact => {
+                let fine = if cell.is_top() {
+                    block_fine
+                } else {
+                    code(SizeCode::at_most(fine_area)).min(root_parent - 1)
+                };
+                (fine, exact_range(block, cell, fine))
+            }
+            Order::Paper => {
+                let fine = i32::from(SizeCode::at_least(fine_area).bits());
+                (fine, paper_range(block, cell, fine, coarse))
+            }
+        };
+        let triangles = block.cell_triangles(cell);
+        let drawn = triangles.partition_point(|t| i32::from(t.size) > coarse) as u32;
+        let triangles = cell.first_triangle..cell.first_triangle + drawn;
+        if !points.is_empty() || !triangles.is_empty() {
+            let order = block.header.order;
+            cut.cells.push(CellCut { cell: i, points, triangles, fine, coarse, order });
+        }
+    }
+}
+
+fn code(code: Option<SizeCode>) -> i32 {
+    code.map_or(-1, |c| i32::from(c.bits()))
+}
+
+/// The prefix of points whose parent is too large.
+fn exact_range(block: &PointsBlock, cell: &CellRecord, fine: i32) -> Range<u32> {
+    let points = block.cell_points(cell);
+    let end = points.partition_point(|p| i32::from(p.parent().bits()) > fine) as u32;
+    cell.first_point..cell.first_point + end
+}
+
+/// The paper's plain range of own sizes.
+fn paper_range(block: &PointsBlock, cell: &CellRecord, fine: i32, coarse: i32) -> Range<u32> {
+    let points = block.cell_points(cell);
+    let start = points.partition_point(|p| i32::from(p.own().bits()) > coarse) as u32;
+    let end = points.partition_point(|p| i32::from(p.own().bits()) >= fine) as u32;
+    cell.first_point + start..cell.first_point + end.max(start)
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

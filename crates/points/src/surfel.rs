@@ -1,0 +1,424 @@
+//! Triangles become surfels (Gilet et al. 2005, section 4.1).
+//!
+//! A surfel is a disc of its triangle's area, at its centroid, with its normal; its colour is the
+//! integral of the texture over the triangle, in linear light and weighted by coverage, and its
+//! opacity the mean coverage (the paper has no opacity). A triangle that is too large, or whose
+//! texture is too uneven, is first cut into 2^k pieces of equal area by bisecting longest edges;
+//! its surfels then all have one size, which is also the size at which the triangle itself takes
+//! over. The pieces of textured triangles are cached by texture coordinates: leaves share them.
+
+use crate::frame::BlockFrame;
+use crate::options::{BakeOptions, SurfelSize};
+use forest_soup::{AlphaMode, Material, ShadedTexture, TriangleSoup};
+use glam::{DVec3, Vec2};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::rc::Rc;
+
+/// A disc of the base point set, in block space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surfel {
+    pub(crate) position: [f32; 3],
+    pub(crate) axis: [f32; 3],
+    /// π·radius², the area of its piece of triangle.
+    pub(crate) area: f32,
+    /// Linear RGB of what is covered.
+    pub(crate) rgb: [f32; 3],
+    /// Mean coverage, > 0.
+    pub(crate) opacity: f32,
+}
+
+impl Surfel {
+    /// Radius of the disc.
+    pub(crate) fn radius(&self) -> f64 {
+        (f64::from(self.area) / PI).sqrt()
+    }
+}
+
+/// No triangle is cut into more than 2^this pieces.
+const MAX_DEPTH: u32 = 12;
+
+/// Opaque triangles are cut until their pieces are this many surfel sizes long: their colour
+/// varies slowly, only their shape matters.
+const OPAQUE_LENGTH: f64 = 4.0;
+
+/// Smaller triangles (in block units²) are dropped as having no area.
+const SMALLEST_AREA: f64 = 1.0 / (1u64 << 52) as f64;
+
+/// Samples (as a power of two) of a texture's integral: over an opaque triangle, over a
+/// translucent one (cached), and the least over a piece of one.
+const OPAQUE_SAMPLES: u32 = 4;
+const TRANSLUCENT_SAMPLES: u32 = 9;
+const PIECE_SAMPLES: u32 = 4;
+
+/// What surfels are made with: shaded textures and limits. Shared by all threads.
+pub(crate) struct SurfelShader<'a> {
+    soup: &'a TriangleSoup,
+    frame: BlockFrame,
+    shades: Vec<Shade>,
+    /// Longest edge of a translucent piece, in block units.
+    size: f64,
+    tolerance: f64,
+}
+
+/// A material, ready for integration.
+struct Shade {
+    texture: Option<ShadedTexture>,
+    /// Raw alpha, for masks under vertex alpha: the cutoff then varies over the triangle.
+    raw: Option<ShadedTexture>,
+    color: [f32; 4],
+    translucent: bool,
+}
+
+impl<'a> SurfelShader<'a> {
+    pub(crate) fn new(soup: &'a TriangleSoup, frame: BlockFrame, options: &BakeOptions) -> Self {
+        let vertex_alpha = soup.colors.par_iter().any(|c| c[3] != 1.0);
+        let shades = soup
+            .materials
+            .par_iter()
+            .map(|m| {
+                let texture = m.texture.map(|t| &*soup.textures[t as usize]);
+                let shaded = texture.map(|t| ShadedTexture::new(t, m));
+                let masked = matches!(m.alpha_mode, AlphaMode::Mask { .. });
+                let raw = texture.filter(|_| masked && vertex_alpha).map(|t| {
+                    ShadedTexture::new(t, &Material { alpha_mode: AlphaMode::Blend, ..m.clone() })
+                });
+                let [r, g, b, _] = m.base_color;
+                let alpha = m.coverage(1.0, 1.0);
+                Shade {
+                    translucent: shaded.as_ref().is_some_and(ShadedTexture::is_translucent),
+                    texture: shaded,
+                    raw,
+                    color: [r * alpha, g * alpha, b * alpha, alpha],
+                }
+            })
+            .collect();
+        let size = match options.surfel_size {
+            SurfelSize::Auto => {
+                let b = frame.bounds.size();
+                (b.y / 384.0).max(b.length() / 4096.0)
+            }
+            SurfelSize::Triangle => f64::INFINITY,
+            SurfelSize::Units(s) => frame.length(s),
+        };
+        Self { soup, frame, shades, size, tolerance: options.alpha_tolerance }
+    }
+
+    /// The surfel size, in block units; infinite for one surfel a triangle.
+    pub(crate) fn size(&self) -> f64 {
+        self.size
+    }
+}
+
+/// What became of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// So many surfels were made.
+    Surfels(u32),
+    /// It has no area.
+    ZeroArea,
+    /// Nothing of it is covered.
+    Transparent,
+}
+
+/// Makes surfels on one thread, with its own cache. What it makes depends on the triangle alone.
+pub(crate) struct SurfelMaker<'a> {
+    shader: &'a SurfelShader<'a>,
+    cache: Vec<Option<(Key, Rc<[Piece]>)>>,
+}
+
+/// Slots of the cache; a tree has a handful of leaf shapes.
+const CACHE_SLOTS: usize = 1 << 10;
+
+/// Everything that the pieces of a translucent triangle depend on.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Key {
+    material: u16,
+    uv: [u32; 6],
+    /// log₂ of the edge-length ratios, in quarters.
+    shape: [i16; 2],
+    /// Least and greatest depth of cutting.
+    depth: [u8; 2],
+}
+
+/// One piece of a triangle: its centroid (weights of corners 1 and 2) and what it shows.
+#[derive(Clone, Copy)]
+struct Piece {
+    at: [f32; 2],
+    /// Premultiplied linear RGBA.
+    rgba: [f32; 4],
+}
+
+/// A triangle of a cut, as weights of corners 1 and 2.
+type Part = [Vec2; 3];
+const WHOLE: Part = [Vec2::ZERO, Vec2::X, Vec2::Y];
+
+impl<'a> SurfelMaker<'a> {
+    pub(crate) fn new(shader: &'a SurfelShader<'a>) -> Self {
+        Self { shader, cache: vec![None; CACHE_SLOTS] }
+    }
+
+    /// Appends the surfels of triangle `i`, whose corners are finite.
+    pub(crate) fn push(&mut self, i: usize, out: &mut Vec<Surfel>) -> Outcome {
+        let s = self.shader;
+        let corners = s.soup.corners(i).map(|p| s.frame.map(p));
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let area = 0.5 * normal.length();
+        if area < SMALLEST_AREA {
+            return Outcome::ZeroArea;
+        }
+        let axis = (normal / (2.0 * area)).as_vec3().to_array();
+        let material = s.soup.triangle_materials[i];
+        let shade = &s.shades[material as usize];
+        let edges = [a.distance_squared(b), b.distance_squared(c), c.distance_squared(a)];
+        let pieces = self.pieces(i, material, shade, edges);
+        let colors = vertex_colors(s.soup, i);
+        let piece_area = (area / pieces.list().len() as f64) as f32;
+        let before = out.len();
+        for piece in pieces.list() {
+            let [u, v] = piece.at.map(f64::from);
+            let rgba = colors.map_or(piece.rgba, |k| tint(piece, &k, s, i));
+            if rgba[3] > 0.0 {
+                let position = (a + (b - a) * u + (c - a) * v).as_vec3().to_array();
+                let rgb = std::array::from_fn(|k| rgba[k] / rgba[3]);
+                out.push(Surfel { position, axis, area: piece_area, rgb, opacity: rgba[3] });
+            }
+        }
+        match out.len() - before {
+            0 => Outcome::Transparent,
+            n => Outcome::Surfels(n as u32),
+        }
+    }
+
+    fn pieces(&mut self, i: usize, material: u16, shade: &Shade, edges: [f64; 3]) -> Pieces {
+        let longest = edges.into_iter().fold(0.0, f64::max).sqrt();
+        let size = self.shader.size;
+        let least = if longest <= OPAQUE_LENGTH * size {
+            0
+        } else {
+            depth_for_length(edges, OPAQUE_LENGTH * size)
+        };
+        let uv = triangle_uv(self.shader.soup, i);
+        let Some(texture) = shade.texture.as_ref().filter(|_| shade.translucent) else {
+            let rgba = |uv| match &shade.texture {
+                Some(texture) => texture.integrate(uv, OPAQUE_SAMPLES),
+                None => shade.color,
+            };
+            return match least {
+                0 => Pieces::whole(rgba(uv)),
+                depth => Pieces::Many(cut(edges, depth, |part| rgba(part_uv(uv, part)))),
+            };
+        };
+        let greatest = if longest <= size { 0 } else { depth_for_length(edges, size) };
+        let key = Key {
+            material,
+            uv: bytemuck::cast(uv),
+            shape: [shape_step(edges[0], edges[2]), shape_step(edges[1], edges[2])],
+            depth: [least.min(greatest) as u8, greatest as u8],
+        };
+        let slot = key.slot();
+        if let Some((k, list)) = &self.cache[slot]
+            && *k == key
+        {
+            return Pieces::Many(list.clone());
+        }
+        let made = translucent_pieces(texture, uv, &key, self.shader.tolerance);
+        self.cache[slot] = Some((key, made.clone()));
+        Pieces::Many(made)
+    }
+}
+
+/// The pieces of one triangle: 2^k of equal area, all listed (transparent ones too).
+enum Pieces {
+    One([Piece; 1]),
+    Many(Rc<[Piece]>),
+}
+
+impl Pieces {
+    fn list(&self) -> &[Piece] {
+        match self {
+            Pieces::One(piece) => piece,
+            Pieces::Many(pieces) => pieces,
+        }
+    }
+
+    fn whole(rgba: [f32; 4]) -> Self {
+        Self::One([Piece { at: [1.0 / 3.0; 2], rgba }])
+    }
+}
+
+/// The pieces at `depth` bisections of a triangle with squared edges `edges`.
+fn cut(edges: [f64; 3], depth: u32, rgba: impl Fn(Part) -> [f32; 4]) -> Rc<[Piece]> {
+    let mut list = Vec::with_capacity(1 << depth);
+    bisect(WHOLE, edges, depth, &mut |part| {
+        let at = ((part[0] + part[1] + part[2]) / 3.0).to_array();
+        list.push(Piece { at, rgba: rgba(part) });
+    });
+    list.into()
+}
+
+/// Cuts deeper until the footprint error is within the tolerance or the depth is the greatest.
+fn translucent_pieces(
+    texture: &ShadedTexture,
+    uv: [Vec2; 3],
+    key: &Key,
+    tolerance: f64,
+) -> Rc<[Piece]> {
+    let edges = [0, 1].map(|k| (f64::from(key.shape[k]) / 4.0).exp2());
+    let edges = [edges[0], edges[1], 1.0];
+    let [least, greatest] = key.depth.map(u32::from);
+    let mut depth = least;
+    loop {
+        let samples = TRANSLUCENT_SAMPLES.saturating_sub(depth).max(PIECE_SAMPLES);
+        let pieces = cut(edges, depth, |part| texture.integrate(part_uv(uv, part), samples));
+        if depth >= greatest || footprint_error(&pieces) <= tolerance {
+            return pieces;
+        }
+        depth += 1;
+    }
+}
+
+/// Share of the covered area that pieces of mean coverage α get wrong: a piece that is truly
+/// covered or bare shows α where there is nothing and lacks 1 − α where there is.
+fn footprint_error(pieces: &[Piece]) -> f64 {
+    let alpha = |p: &Piece| f64::from(p.rgba[3]);
+    let covered: f64 = pieces.iter().map(alpha).sum();
+    let wrong: f64 = pieces.iter().map(|p| 2.0 * alpha(p) * (1.0 - alpha(p))).sum();
+    if covered > 0.0 { wrong / covered } else { 0.0 }
+}
+
+/// Visits the 2^depth parts of `part` got by bisecting longest edges; `edges` are the squared
+/// lengths of 0–1, 1–2 and 2–0.
+fn bisect(part: Part, edges: [f64; 3], depth: u32, visit: &mut impl FnMut(Part)) {
+    if depth == 0 {
+        return visit(part);
+    }
+    let (part, edges) = longest_first(part, edges);
+    let [p, q, r] = part;
+    let middle = (p + q) * 0.5;
+    let [first, second] = halves(edges);
+    bisect([p, middle, r], first, depth - 1, visit);
+    bisect([middle, q, r], second, depth - 1, visit);
+}
+
+/// Turns a triangle so that its longest edge comes first.
+fn longest_first(part: Part, edges: [f64; 3]) -> (Part, [f64; 3]) {
+    let ([p, q, r], [a, b, c]) = (part, edges);
+    if a >= b && a >= c {
+        (part, edges)
+    } else if b >= c {
+        ([q, r, p], [b, c, a])
+    } else {
+        ([r, p, q], [c, a, b])
+    }
+}
+
+/// Squared edges of both halves of a triangle p q r whose edge p–q comes first and is halved at m:
+/// of p m r and of m q r. The median is Apollonius's: m² = (2b² + 2c² − a²)/4.
+fn halves([a, b, c]: [f64; 3]) -> [[f64; 3]; 2] {
+    let median = (0.25 * (2.0 * b + 2.0 * c - a)).max(0.0);
+    [[0.25 * a, median, c], [0.25 * a, b, median]]
+}
+
+/// The least depth at which all pieces have edges of at most `length`.
+fn depth_for_length(edges: [f64; 3], length: f64) -> u32 {
+    let limit = length * length;
+    let mut shapes = vec![edges];
+    for depth in 0..MAX_DEPTH {
+        shapes.retain(|e| e.iter().any(|&x| x > limit));
+        if shapes.is_empty() {
+            return depth;
+        }
+        let cut: Vec<[f64; 3]> =
+            shapes.iter().flat_map(|&e| halves(longest_first(WHOLE, e).1)).collect();
+        // Bisection makes few shapes; equal ones (to a millionth) need no second look.
+        shapes.clear();
+        for e in cut {
+            let same = |o: &[f64; 3]| o.iter().zip(&e).all(|(a, b)| (a - b).abs() <= 1e-6 * limit);
+            if !shapes.iter().any(same) {
+                shapes.push(e);
+            }
+        }
+    }
+    MAX_DEPTH
+}
+
+/// log₂(a/b) in quarters: shapes this alike are cut alike.
+fn shape_step(a: f64, b: f64) -> i16 {
+    ((a / b).log2() * 4.0).round().clamp(-200.0, 200.0) as i16
+}
+
+impl Key {
+    fn slot(&self) -> usize {
+        let mut hash = u64::from(self.material) ^ 0x9e37_79b9_7f4a_7c15;
+        for word in self.uv {
+            hash = (hash ^ u64::from(word)).wrapping_mul(0xff51_afd7_ed55_8ccd);
+            hash ^= hash >> 32;
+        }
+        hash as usize & (CACHE_SLOTS - 1)
+    }
+}
+
+fn triangle_uv(soup: &TriangleSoup, i: usize) -> [Vec2; 3] {
+    if soup.uvs.is_empty() {
+        return [Vec2::ZERO; 3];
+    }
+    soup.triangles[i].map(|v| soup.uvs[v as usize])
+}
+
+fn part_uv([a, b, c]: [Vec2; 3], part: Part) -> [Vec2; 3] {
+    part.map(|w| a + (b - a) * w.x + (c - a) * w.y)
+}
+
+fn vertex_colors(soup: &TriangleSoup, i: usize) -> Option<[[f32; 4]; 3]> {
+    if soup.colors.is_empty() {
+        return None;
+    }
+    Some(soup.triangles[i].map(|v| soup.colors[v as usize]))
+}
+
+/// A piece's colour under vertex colours, which are taken at its centroid. Under a mask with
+/// vertex alpha the coverage is counted anew, over the whole triangle's texture.
+fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f32; 4] {
+    let [u, v] = piece.at;
+    let color: [f32; 4] = std::array::from_fn(|k| {
+        colors[0][k] * (1.0 - u - v) + colors[1][k] * u + colors[2][k] * v
+    });
+    let index = s.soup.triangle_materials[i] as usize;
+    let material = &s.soup.materials[index];
+    let coverage = match (material.alpha_mode, &s.shades[index].raw) {
+        (AlphaMode::Opaque, _) => 1.0,
+        (AlphaMode::Blend, _) => color[3],
+        // Of a mask without texture all or nothing passes.
+        (AlphaMode::Mask { .. }, None) => material.coverage(1.0, color[3]),
+        (AlphaMode::Mask { cutoff }, Some(raw)) => {
+            let [a, b, c] = triangle_uv(s.soup, i);
+            let passes = |w: Part| {
+                let at = (w[0] + w[1] + w[2]) / 3.0;
+                raw.sample(a + (b - a) * at.x + (c - a) * at.y)[3] * color[3] >= cutoff
+            };
+            let (mut inside, mut all) = (0u32, 0u32);
+            bisect(WHOLE, [2.0, 1.0, 1.0], TRANSLUCENT_SAMPLES, &mut |w| {
+                inside += u32::from(passes(w));
+                all += 1;
+            });
+            let coverage = inside as f32 / all as f32;
+            let plain = piece.rgba[3].max(f32::MIN_POSITIVE);
+            return std::array::from_fn(|k| {
+                if k == 3 { coverage } else { piece.rgba[k] / plain * coverage * color[k] }
+            });
+        }
+    };
+    std::array::from_fn(|k| {
+        piece.rgba[k] * coverage * if k == 3 { 1.0 } else { color[k] }
+    })
+}
+
+/// Direction of the surfel's axis as a vector.
+pub(crate) fn axis_of(s: &Surfel) -> DVec3 {
+    DVec3::new(f64::from(s.axis[0]), f64::from(s.axis[1]), f64::from(s.axis[2]))
+}
+
+#[cfg(test)]
+mod tests;
