@@ -84,27 +84,6 @@ impl Model {
         self.instances.iter().map(|i| self.meshes[i.mesh as usize].triangles.len() as u64).sum()
     }
 
-    /// Appends another model, its instances placed by `placement`.
-    pub fn append(&mut self, other: Model, placement: Placement) {
-        let mesh_base = self.meshes.len() as u32;
-        let material_base = self.materials.len() as u16;
-        let texture_base = self.textures.len() as u32;
-        self.meshes.extend(
-            other.meshes.into_iter().map(|m| Mesh { material: m.material + material_base, ..m }),
-        );
-        self.instances.extend(other.instances.into_iter().map(|i| Instance {
-            mesh: i.mesh + mesh_base,
-            placement: placement * i.placement,
-        }));
-        self.materials.extend(
-            other
-                .materials
-                .into_iter()
-                .map(|m| Material { texture: m.texture.map(|t| t + texture_base), ..m }),
-        );
-        self.textures.extend(other.textures);
-    }
-
     /// One soup of all instances. Its origin is the first instance's translation; positions are
     /// rounded to `f32` only after that translation is taken out. Mirrored placements flip the
     /// winding, so that normals keep pointing the same way.

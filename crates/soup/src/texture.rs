@@ -1,7 +1,7 @@
 //! Images as files hold them: 8-bit sRGB with straight alpha.
 
 /// What happens outside `0..1` (glTF sampler wrap modes).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Wrap {
     /// The image repeats.
     #[default]

@@ -121,8 +121,8 @@ fn a_needle_of_aspect_a_million_stays_on_its_line() {
     // Pieces of at most 0.04: 1/2⁵ of the length, and equal areas then take 4⁵ of them.
     assert_eq!(s.len(), 1024);
     let area: f64 = s.iter().map(|s| f64::from(s.area)).sum();
-    // The block unit is 0.5.
-    assert!((area / (0.5e-6 / 0.25) - 1.0).abs() < 1e-4, "{area}");
+    // The half diagonal is just above ½: the block unit is 1.
+    assert!((area / 0.5e-6 - 1.0).abs() < 1e-4, "{area}");
     let farthest = s.iter().map(|s| s.position[1].abs()).fold(0.0, f32::max);
     assert!(farthest < 1e-5);
 }

@@ -1,0 +1,153 @@
+//! `forest-bake draw`.
+
+use crate::failure::Usage;
+use anyhow::{Context, Result};
+use forest_draw::{Light, Picture, Style, Surfaces, draw_points};
+use forest_pack::Pack;
+use forest_points::{PixelArea, PointsBlock, Thresholds, read_materials};
+use forest_soup::{Camera, Projection};
+use glam::DVec3;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Pack to draw.
+    #[arg(value_name = "PACK")]
+    pack: PathBuf,
+    /// PNG to write.
+    #[arg(short, long, value_name = "PNG")]
+    output: PathBuf,
+    /// Side of the picture in pixels.
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=16384))]
+    size: u32,
+    /// front, back, left, right, top, diagonal, or YAW,PITCH in degrees: where the camera stands.
+    #[arg(long, default_value = "front", value_name = "VIEW", allow_hyphen_values = true)]
+    view: String,
+    /// Perspective camera at this many block radii from the centre, instead of a parallel one.
+    #[arg(long, value_name = "RADII")]
+    distance: Option<f64>,
+    /// s_m, smallest projected area of a point in square pixels; several give pictures side by side.
+    #[arg(long, default_value = "1", value_delimiter = ',', value_name = "PX2")]
+    finest: Vec<f64>,
+    /// s_M, largest projected area of a point: larger ones are drawn as triangles. Default: 16 times
+    /// s_m.
+    #[arg(long, value_name = "PX2")]
+    largest: Option<f64>,
+    /// k, added to both at the back of the block and taken from them at its front.
+    #[arg(long, default_value_t = 0.0, value_name = "PX2", allow_hyphen_values = true)]
+    bias: f64,
+    /// Light.
+    #[arg(long, value_enum, default_value = "sun")]
+    light: LightArg,
+    /// Samples a side of a pixel.
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=16))]
+    samples: u32,
+    /// Straight alpha instead of a grey background.
+    #[arg(long)]
+    alpha: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum LightArg {
+    /// Base colours.
+    Albedo,
+    /// A sun from the left and light from everywhere; no shadows.
+    Sun,
+}
+
+/// Linear grey behind the tree.
+const BACKGROUND: f32 = 0.6;
+
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+    let pack = Pack::open(&args.pack)?;
+    let block = PointsBlock::open(&pack)?;
+    let surfaces = if block.triangles.is_empty() {
+        None
+    } else {
+        let (materials, textures) = read_materials(&pack)?;
+        Some(Surfaces::new(&materials, &textures))
+    };
+    let camera = args.camera(&block)?;
+    let light = match args.light {
+        LightArg::Albedo => Light::Albedo,
+        LightArg::Sun => Light::MORNING,
+    };
+    let style = Style { samples: args.samples, light };
+    let mut pictures = Vec::new();
+    for &finest in &args.finest {
+        let thresholds = Thresholds {
+            finest: PixelArea(finest),
+            largest: PixelArea(args.largest.unwrap_or(16.0 * finest)),
+            depth_bias: PixelArea(args.bias),
+        };
+        let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, &style);
+        if !quiet {
+            eprintln!(
+                "s_m {finest} px²: {} points, {} triangles, coverage {:.4}",
+                drawn.points,
+                drawn.triangles,
+                picture.mean_coverage()
+            );
+        }
+        pictures.push(picture);
+    }
+    write(args, &pictures)
+}
+
+impl Args {
+    fn camera(&self, block: &PointsBlock) -> Result<Camera> {
+        let [yaw, pitch] = match self.view.as_str() {
+            "front" => [0.0, 0.0],
+            "right" => [90.0, 0.0],
+            "back" => [180.0, 0.0],
+            "left" => [-90.0, 0.0],
+            "top" => [0.0, 90.0],
+            "diagonal" => [45.0, 30.0],
+            text => {
+                let parts: Option<Vec<f64>> = text.split(',').map(|v| v.parse().ok()).collect();
+                let angles = parts.and_then(|v| <[f64; 2]>::try_from(v).ok());
+                let wrong = || Usage(format!("--view {text:?}: a name or YAW,PITCH in degrees"));
+                angles.filter(|a| a.iter().all(|v| v.is_finite())).ok_or_else(wrong)?
+            }
+        };
+        let (yaw, pitch) = (f64::to_radians(yaw), f64::to_radians(pitch));
+        let from = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos());
+        let radius = block.half_diagonal();
+        let [min, max] = [block.header.min, block.header.max].map(DVec3::from_array);
+        let center = block.to_world((min + max) * 0.5);
+        let size = [self.size; 2];
+        Ok(match self.distance {
+            None => {
+                let height = 2.0 * radius;
+                let eye = center + from * (2.0 * radius);
+                Camera::new(eye, -from, Projection::Orthographic { height }, size)
+            }
+            Some(d) if d.is_finite() && d > 0.0 => {
+                let fov_y = if d > 1.05 { 2.0 * (1.0 / d).asin() } else { 1.2 };
+                let eye = center + from * (d * radius);
+                Camera::new(eye, -from, Projection::Perspective { fov_y }, size)
+            }
+            Some(d) => return Err(Usage(format!("--distance {d}: must be positive")).into()),
+        })
+    }
+}
+
+/// All pictures side by side.
+fn write(args: &Args, pictures: &[Picture]) -> Result<()> {
+    let n = pictures.len() as u32;
+    let side = args.size;
+    let name = || args.output.display().to_string();
+    let file = |e: image::ImageError| match e {
+        image::ImageError::IoError(e) => anyhow::Error::new(e),
+        e => e.into(),
+    };
+    if args.alpha {
+        let rows: Vec<_> = pictures.iter().map(Picture::straight).collect();
+        let at = |x: u32, y: u32| image::Rgba(rows[(x / side) as usize][(y * side + x % side) as usize]);
+        image::RgbaImage::from_fn(side * n, side, at).save(&args.output).map_err(file).with_context(name)
+    } else {
+        let rows: Vec<_> = pictures.iter().map(|p| p.over(BACKGROUND)).collect();
+        let at = |x: u32, y: u32| image::Rgb(rows[(x / side) as usize][(y * side + x % side) as usize]);
+        image::RgbImage::from_fn(side * n, side, at).save(&args.output).map_err(file).with_context(name)
+    }
+}

@@ -1,0 +1,64 @@
+//! Errors to exit codes.
+
+use forest_import::ImportError;
+use forest_pack::PackError;
+use forest_points::BakeError;
+use forest_soup::FlattenError;
+use std::process::ExitCode;
+
+
+/// Wrong usage.
+pub(crate) const USAGE: ExitCode = ExitCode::FAILURE; // 1
+
+/// A request that makes no sense, in words.
+#[derive(Debug)]
+pub(crate) struct Usage(pub(crate) String);
+
+impl std::fmt::Display for Usage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+/// The documented code of an error: by the first cause that has one.
+pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    ExitCode::from(error.chain().find_map(number).unwrap_or(4))
+}
+
+fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
+    if cause.is::<Usage>() {
+        return Some(1);
+    }
+    if cause.is::<std::io::Error>() {
+        return Some(2);
+    }
+    if let Some(e) = cause.downcast_ref::<ImportError>() {
+        return Some(match e {
+            ImportError::Io { .. } => 2,
+            ImportError::Unsupported { .. } => 5,
+            _ => 3,
+        });
+    }
+    if let Some(e) = cause.downcast_ref::<PackError>() {
+        return Some(pack(e));
+    }
+    if let Some(e) = cause.downcast_ref::<BakeError>() {
+        return Some(match e {
+            BakeError::Option { .. } => 1,
+            BakeError::Pack(e) => pack(e),
+            BakeError::TooManyPoints(_) => 4,
+            _ => 3,
+        });
+    }
+    cause.is::<FlattenError>().then_some(3)
+}
+
+fn pack(e: &PackError) -> u8 {
+    match e {
+        PackError::Io { .. } => 2,
+        PackError::Unsupported { .. } => 5,
+        _ => 3,
+    }
+}

@@ -1,0 +1,193 @@
+//! `forest-bake inspect`.
+
+use crate::output;
+use anyhow::Result;
+use forest_pack::header::{self, Meta};
+use forest_pack::{Codec, Pack, SectionId, kind};
+use forest_points::{BakeCounts, PointsBlock};
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Pack to look into.
+    #[arg(value_name = "PACK")]
+    pack: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report {
+    schema: &'static str,
+    file: PathBuf,
+    bytes: u64,
+    generator: String,
+    source_hash: String,
+    sources: Vec<SourceReport>,
+    sections: Vec<SectionReport>,
+    points: Option<PointsReport>,
+}
+
+#[derive(Serialize)]
+struct SourceReport {
+    name: String,
+    hash: String,
+    placement: String,
+}
+
+#[derive(Serialize)]
+struct SectionReport {
+    name: String,
+    index: u32,
+    codec: &'static str,
+    stored_bytes: u64,
+    bytes: u64,
+}
+
+/// Lengths are world units.
+#[derive(Serialize)]
+struct PointsReport {
+    min: [f64; 3],
+    max: [f64; 3],
+    grid: [u32; 3],
+    cells: usize,
+    order: String,
+    radius: String,
+    counts: BakeCounts,
+    triangles: usize,
+    /// Null for one surfel a triangle.
+    surfel_size: Option<f64>,
+    alpha_tolerance: f64,
+    /// Positions are off by at most this along each axis.
+    position_error: f64,
+    bytes_per_surfel: f64,
+    /// Radii of the finest and the coarsest point.
+    radius_range: [f64; 2],
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let report = Report::of(&Pack::open(&args.pack)?)?;
+    let text = if args.json {
+        format!("{}\n", serde_json::to_string_pretty(&report)?)
+    } else {
+        report.text()?
+    };
+    Ok(output::print(&text)?)
+}
+
+impl Report {
+    fn of(pack: &Pack) -> Result<Self> {
+        let meta: Meta = header::decode(pack, SectionId::new(kind::META, 0))?;
+        let sources = meta
+            .sources
+            .into_iter()
+            .map(|s| SourceReport { name: s.name, hash: hex(&s.hash), placement: s.placement })
+            .collect();
+        let sections = pack
+            .sections()
+            .map(|(id, s)| SectionReport {
+                name: kind::name(id.kind),
+                index: id.index,
+                codec: match s.codec {
+                    Codec::None => "none",
+                    Codec::Zstd => "zstd",
+                },
+                stored_bytes: s.stored_length,
+                bytes: s.length,
+            })
+            .collect();
+        let points = if PointsBlock::is_in(pack) {
+            Some(PointsReport::of(&PointsBlock::open(pack)?))
+        } else {
+            None
+        };
+        Ok(Self {
+            schema: "forest-bake/inspect/1",
+            file: pack.path().into(),
+            bytes: pack.file_length(),
+            generator: meta.generator,
+            source_hash: hex(&meta.source_hash),
+            sources,
+            sections,
+            points,
+        })
+    }
+
+    fn text(&self) -> Result<String, std::fmt::Error> {
+        let mut t = String::new();
+        writeln!(t, "{}: {}, by {}", self.file.display(), output::bytes(self.bytes), self.generator)?;
+        writeln!(t, "source {}", self.source_hash)?;
+        for s in &self.sources {
+            let at = if s.placement.is_empty() { "" } else { " at " };
+            writeln!(t, "  {}{at}{}", s.name, s.placement)?;
+        }
+        if let Some(p) = &self.points {
+            p.text(&mut t)?;
+        }
+        writeln!(t, "sections")?;
+        for s in &self.sections {
+            let name = format!("{}[{}]", s.name, s.index);
+            let stored = output::bytes(s.stored_bytes);
+            let packed = if s.codec == "none" { String::new() } else { format!(" ({} of {})", s.codec, output::bytes(s.bytes)) };
+            writeln!(t, "  {name:<26} {stored:>12}{packed}")?;
+        }
+        Ok(t)
+    }
+}
+
+impl PointsReport {
+    fn of(block: &PointsBlock) -> Self {
+        let h = &block.header;
+        let world = |v: [f64; 3]| block.to_world(v.into()).to_array();
+        let scale = block.scale();
+        let radii = block.points.iter().map(|p| p.own());
+        let radius = |code: Option<forest_points::SizeCode>| code.map_or(0.0, |c| c.radius() * scale);
+        Self {
+            min: world(h.min),
+            max: world(h.max),
+            grid: h.grid,
+            cells: block.cells.len() - 1,
+            order: format!("{:?}", h.order).to_lowercase(),
+            radius: format!("{:?}", h.radius).to_lowercase(),
+            counts: h.counts,
+            triangles: block.triangles.len(),
+            surfel_size: h.surfel_size.is_finite().then_some(h.surfel_size * scale),
+            alpha_tolerance: h.alpha_tolerance,
+            position_error: 0.5 * f64::from(h.step_exponent).exp2() * scale,
+            bytes_per_surfel: size_of_val(block.points) as f64 / h.counts.surfels.max(1) as f64,
+            radius_range: [radius(radii.clone().min()), radius(radii.max())],
+        }
+    }
+
+    fn text(&self, t: &mut String) -> std::fmt::Result {
+        let [x, y, z] = self.grid;
+        let c = &self.counts;
+        let size: Vec<String> =
+            self.min.iter().zip(&self.max).map(|(a, b)| format!("{:.3}", b - a)).collect();
+        writeln!(t, "points")?;
+        writeln!(t, "  box                 {} from {:.3?}", size.join(" × "), self.min)?;
+        writeln!(t, "  grid                {x}×{y}×{z}, {} cells in use", self.cells)?;
+        writeln!(t, "  radius, order       {}, {}", self.radius, self.order)?;
+        writeln!(t, "  source triangles    {}", output::count(c.source_triangles))?;
+        if let Some(dropped) = c.dropped() {
+            writeln!(t, "  left out            {dropped}")?;
+        }
+        writeln!(t, "  surfels, points     {}, {}", output::count(c.surfels), output::count(c.points))?;
+        writeln!(t, "  triangles stored    {}", output::count(self.triangles as u64))?;
+        match self.surfel_size {
+            Some(s) => writeln!(t, "  surfel size         {s:.4}, alpha footprint within {}", self.alpha_tolerance)?,
+            None => writeln!(t, "  surfel size         one a triangle")?,
+        }
+        let [finest, coarsest] = self.radius_range;
+        writeln!(t, "  radii               {finest:.5} to {coarsest:.3}")?;
+        writeln!(t, "  position error      {:.1e} at most", self.position_error)?;
+        writeln!(t, "  bytes per surfel    {:.1} (all levels)", self.bytes_per_surfel)
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}

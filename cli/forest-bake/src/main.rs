@@ -1,0 +1,77 @@
+//! `forest-bake`: tree models in, LOD packs out. One file a subcommand; no algorithm here.
+
+mod draw;
+mod failure;
+mod inspect;
+mod levels;
+mod output;
+mod points;
+mod source;
+mod verify;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Bakes tree models (glTF, OBJ) into LOD packs.
+///
+/// Exit codes: 0 ok, 1 wrong usage, 2 input or output failed, 3 invalid input, 4 failed while
+/// working, 5 the input needs something that is not supported.
+#[derive(Parser)]
+#[command(name = "forest-bake", version, max_term_width = 100)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+    /// Say nothing but errors.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Use this many threads (default: all cores). The result does not depend on it.
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Bake clustered, size-sorted points.
+    Points(points::Args),
+    /// Draw a picture of a pack, at one or several levels of detail.
+    Draw(draw::Args),
+    /// Print what is in a pack.
+    Inspect(inspect::Args),
+    /// Check every byte and rule of packs.
+    Verify(verify::Args),
+    /// Print what each radius rule and order keeps, level by level.
+    Levels(levels::Args),
+}
+
+fn main() -> ExitCode {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => {
+            let wrong = error.use_stderr();
+            // Nothing can be done if the terminal is gone.
+            let _ = error.print();
+            return if wrong { failure::USAGE } else { ExitCode::SUCCESS };
+        }
+    };
+    match run(args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("forest-bake: {error:#}");
+            failure::exit_code(&error)
+        }
+    }
+}
+
+fn run(args: Args) -> anyhow::Result<()> {
+    if let Some(threads) = args.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    }
+    let quiet = args.quiet;
+    match args.command {
+        Command::Points(a) => points::run(&a, quiet),
+        Command::Draw(a) => draw::run(&a, quiet),
+        Command::Inspect(a) => inspect::run(&a),
+        Command::Verify(a) => verify::run(&a, quiet),
+        Command::Levels(a) => levels::run(&a, quiet),
+    }
+}

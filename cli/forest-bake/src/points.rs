@@ -1,0 +1,196 @@
+//! `forest-bake points`.
+
+use crate::failure::Usage;
+use crate::output;
+use crate::source::{LoadedSource, PointsOptions, SourceArgs};
+use anyhow::Result;
+use forest_pack::header::{self, Meta};
+use forest_pack::{Codec, Pack, PackWriter, SectionId, kind};
+use forest_points::{BakeOptions, BakeReport, Order, RadiusRule, bake};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    source: SourceArgs,
+    /// Pack to write. An existing pack of the same source keeps its other representations.
+    #[arg(short, long, value_name = "PACK")]
+    output: PathBuf,
+    #[command(flatten)]
+    options: PointsOptions,
+    /// How clusters get their radius.
+    #[arg(long, value_enum, default_value = "opacity")]
+    radius: Radius,
+    /// How arrays are sorted and cut.
+    #[arg(long, value_enum, default_value = "exact")]
+    order: Sorting,
+    /// Leave out triangles, materials and textures.
+    #[arg(long)]
+    points_only: bool,
+    /// Replace a pack of another source, or one with sections this version does not know.
+    #[arg(long)]
+    force: bool,
+    /// Print counts and times as JSON on stdout.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Radius {
+    /// Keep the projected area of the surfels' union: equivalent opacity.
+    Opacity,
+    /// Keep the sum of the surfels' projected areas.
+    Area,
+    /// Opaque spheres and the formula of Gilet, Meyer, Neyret 2005.
+    Paper,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Sorting {
+    /// By the parent's size: cuts represent every triangle exactly once.
+    Exact,
+    /// By the point's own size, as in the paper.
+    Paper,
+}
+
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+    let start = Instant::now();
+    let source = args.source.load(quiet)?;
+    let kept = existing(args, &source.meta)?;
+    let options = args.bake_options(source.trees)?;
+    let mut writer = PackWriter::create(&args.output)?;
+    let meta = SectionId::new(kind::META, 0);
+    writer.add(meta, Codec::None, &header::encode(&source.meta))?;
+    let bar = output::bar(source.soup.triangles.len() as u64, "points", quiet);
+    let report = bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
+    bar.finish_and_clear();
+    if let Some(pack) = &kept {
+        for (id, _) in pack.sections().filter(|(id, _)| is_foreign(id.kind, &options)) {
+            writer.copy(pack, id)?;
+        }
+    }
+    writer.finish()?;
+    let summary = Summary::new(&args.output, &source, &report, start.elapsed().as_secs_f64())?;
+    if !quiet {
+        summary.tell(&report);
+    }
+    if args.json {
+        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+    }
+    Ok(())
+}
+
+impl Args {
+    fn bake_options(&self, trees: usize) -> Result<BakeOptions> {
+        Ok(BakeOptions {
+            radius: match self.radius {
+                Radius::Opacity => RadiusRule::Opacity,
+                Radius::Area => RadiusRule::Area,
+                Radius::Paper => RadiusRule::Paper,
+            },
+            order: match self.order {
+                Sorting::Exact => Order::Exact,
+                Sorting::Paper => Order::Paper,
+            },
+            triangles: !self.points_only,
+            ..self.options.bake_options(trees)?
+        })
+    }
+}
+
+/// The pack that is there already, if its other representations may be kept.
+fn existing(args: &Args, meta: &Meta) -> Result<Option<Pack>> {
+    if !args.output.exists() {
+        return Ok(None);
+    }
+    let refuse = |why: String| {
+        Usage(format!("{}: {why}; give --force to replace it", args.output.display()))
+    };
+    let pack = match Pack::open(&args.output) {
+        Ok(pack) => pack,
+        Err(_) if args.force => return Ok(None),
+        Err(e) => return Err(refuse(format!("exists and is not a sound pack ({e})")).into()),
+    };
+    let known = header::decode::<Meta>(&pack, SectionId::new(kind::META, 0));
+    let same = known.is_ok_and(|m| m.source_hash == meta.source_hash);
+    match (same, pack.unknown_sections().is_empty()) {
+        (true, true) => Ok(Some(pack)),
+        _ if args.force => Ok(None),
+        (false, _) => Err(refuse("is a pack of another source".into()).into()),
+        (true, false) => Err(refuse("has sections that this version cannot keep".into()).into()),
+    }
+}
+
+/// Whether a section belongs to another representation.
+fn is_foreign(kind: u16, options: &BakeOptions) -> bool {
+    match kind {
+        kind::META | kind::POINTS_HEADER..=kind::POINTS_TRIANGLE_COLORS => false,
+        kind::MATERIALS | kind::TEXTURE => !options.triangles,
+        _ => true,
+    }
+}
+
+/// What was done, for people and programs.
+#[derive(Serialize)]
+struct Summary {
+    output: PathBuf,
+    bytes: u64,
+    triangles: u64,
+    surfels: u64,
+    points: u64,
+    cells: usize,
+    dropped: Dropped,
+    seconds: f64,
+    import_seconds: f64,
+    /// Seconds by stage; those of parallel stages are summed over threads.
+    stage_seconds: Vec<(&'static str, f64)>,
+}
+
+#[derive(Serialize)]
+struct Dropped {
+    non_finite: u64,
+    zero_area: u64,
+    duplicate: u64,
+    transparent: u64,
+}
+
+impl Summary {
+    fn new(output: &Path, source: &LoadedSource, report: &BakeReport, seconds: f64) -> Result<Self> {
+        let c = report.header.counts;
+        Ok(Self {
+            output: output.into(),
+            bytes: std::fs::metadata(output)?.len(),
+            triangles: c.source_triangles,
+            surfels: c.surfels,
+            points: c.points,
+            cells: report.cells,
+            dropped: Dropped {
+                non_finite: c.non_finite,
+                zero_area: c.zero_area,
+                duplicate: c.duplicate,
+                transparent: c.transparent,
+            },
+            seconds,
+            import_seconds: source.seconds,
+            stage_seconds: report.times.stages().map(|(n, t)| (n, t.seconds())).to_vec(),
+        })
+    }
+
+    fn tell(&self, report: &BakeReport) {
+        if let Some(dropped) = report.header.counts.dropped() {
+            eprintln!("warning: left out triangles: {dropped}");
+        }
+        eprintln!(
+            "{}: {} triangles → {} surfels, {} points in {} cells, {}, {:.2} s",
+            self.output.display(),
+            output::count(self.triangles),
+            output::count(self.surfels),
+            output::count(self.points),
+            self.cells,
+            output::bytes(self.bytes),
+            self.seconds
+        );
+    }
+}

@@ -1,0 +1,110 @@
+//! Reading the block that a command works on.
+
+use anyhow::Result;
+use forest_import::{Block, Limits};
+use forest_pack::header::{Meta, Source};
+use forest_soup::TriangleSoup;
+use std::time::Instant;
+
+/// Which files, and what they may hold.
+#[derive(clap::Args)]
+pub(crate) struct SourceArgs {
+    /// Trees: FILE, or FILE@x,y,z:yaw=DEGREES,scale=FACTOR for several placed together; or one
+    /// block file (.toml).
+    #[arg(required = true, value_name = "TREE")]
+    trees: Vec<String>,
+    /// Refuse blocks of more triangles.
+    #[arg(long, default_value_t = 50_000_000, value_name = "N")]
+    max_triangles: u64,
+    /// Read files outside the folder of the file that names them.
+    #[arg(long)]
+    allow_outside: bool,
+}
+
+/// A block, flattened.
+pub(crate) struct LoadedSource {
+    pub(crate) soup: TriangleSoup,
+    pub(crate) meta: Meta,
+    /// Trees in the block.
+    pub(crate) trees: usize,
+    /// Time of reading and flattening.
+    pub(crate) seconds: f64,
+}
+
+impl SourceArgs {
+    /// Reads and flattens; warnings go to stderr.
+    pub(crate) fn load(&self, quiet: bool) -> Result<LoadedSource> {
+        let start = Instant::now();
+        let block = Block::parse(&self.trees)?;
+        let limits = Limits { allow_outside: self.allow_outside, ..Limits::default() };
+        let loaded = block.load(&limits)?;
+        if !quiet {
+            loaded.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+        }
+        let sources: Vec<Source> = block
+            .parts
+            .iter()
+            .zip(&loaded.hashes)
+            .map(|(part, &hash)| Source {
+                name: part.file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+                hash,
+                placement: part.placement_text(),
+            })
+            .collect();
+        let mut hasher = blake3::Hasher::new();
+        for s in &sources {
+            hasher.update(&s.hash);
+            hasher.update(&(s.placement.len() as u64).to_le_bytes());
+            hasher.update(s.placement.as_bytes());
+        }
+        let meta = Meta {
+            generator: concat!("forest-bake ", env!("CARGO_PKG_VERSION")).into(),
+            source_hash: *hasher.finalize().as_bytes(),
+            sources,
+        };
+        let soup = loaded.model.flatten(self.max_triangles)?;
+        let seconds = start.elapsed().as_secs_f64();
+        Ok(LoadedSource { soup, meta, trees: block.parts.len(), seconds })
+    }
+}
+
+/// The options of a points bake that describe the representation.
+#[derive(clap::Args)]
+pub(crate) struct PointsOptions {
+    /// Cells along x, up and z, as 4x4x4; "auto" takes 64 near-cubes for one tree, 1024 for several.
+    #[arg(long, default_value = "auto", value_name = "XxYxZ")]
+    grid: String,
+    /// Largest extent of the finest points in world units; "auto" is 1/384 of the height;
+    /// "triangle" makes one point of each triangle.
+    #[arg(long, default_value = "auto", value_name = "LENGTH")]
+    surfel_size: String,
+    /// Cut textured cards until this share of their alpha footprint at most is wrong.
+    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
+    alpha_tolerance: f64,
+}
+
+impl PointsOptions {
+    pub(crate) fn bake_options(&self, trees: usize) -> Result<forest_points::BakeOptions> {
+        use crate::failure::Usage;
+        use forest_points::{GridChoice, SurfelSize};
+        let surfel_size = match self.surfel_size.as_str() {
+            "auto" => SurfelSize::Auto,
+            "triangle" => SurfelSize::Triangle,
+            text => SurfelSize::Units(text.parse().map_err(|_| {
+                Usage(format!("--surfel-size {text:?}: a length, \"auto\" or \"triangle\""))
+            })?),
+        };
+        let grid = match self.grid.as_str() {
+            "auto" if trees == 1 => GridChoice::TREE,
+            "auto" => GridChoice::GROUP,
+            text => {
+                let cells: Option<Vec<u32>> = text.split('x').map(|n| n.parse().ok()).collect();
+                let cells = cells.and_then(|c| <[u32; 3]>::try_from(c).ok());
+                let wrong = || Usage(format!("--grid {text:?}: three numbers like 4x4x4, or \"auto\""));
+                GridChoice::Fixed(cells.ok_or_else(wrong)?)
+            }
+        };
+        let alpha_tolerance = self.alpha_tolerance;
+        Ok(forest_points::BakeOptions { grid, surfel_size, alpha_tolerance, ..Default::default() })
+    }
+}

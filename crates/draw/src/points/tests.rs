@@ -1,0 +1,104 @@
+use super::*;
+use crate::Light;
+use forest_pack::{Pack, PackWriter};
+use forest_points::{BakeOptions, PixelArea, SurfelSize, bake};
+use forest_soup::{AlphaMode, TriangleSoup, Wrap};
+use glam::Vec3;
+
+/// A unit square in the XY plane, textured with a checker of covered and bare quarters.
+fn card() -> TriangleSoup {
+    let texels = (0..64u32 * 64)
+        .map(|i| [200, 40, 20, if (i % 64 / 32 + i / 64 / 32) % 2 == 0 { 255 } else { 0 }])
+        .collect();
+    TriangleSoup {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+        uvs: vec![Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        triangle_materials: vec![0, 0],
+        materials: vec![Material {
+            texture: Some(0),
+            alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+            ..Material::default()
+        }],
+        textures: vec![Arc::new(Texture { name: "checker".into(), width: 64, height: 64, texels, wrap: [Wrap::Clamp; 2] })],
+        ..TriangleSoup::default()
+    }
+}
+
+fn baked(soup: &TriangleSoup, size: f64) -> Pack {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path).unwrap();
+    let options = BakeOptions { surfel_size: SurfelSize::Units(size), ..BakeOptions::default() };
+    bake(soup, &options, &mut writer, &|_| {}).unwrap();
+    writer.finish().unwrap();
+    Pack::from_bytes(&path, &std::fs::read(&path).unwrap()).unwrap()
+}
+
+fn picture(pack: &Pack, forward: DVec3, largest: f64, projection: Projection) -> (Picture, Drawn) {
+    let block = PointsBlock::open(pack).unwrap();
+    let (materials, textures) = forest_points::read_materials(pack).unwrap();
+    let surfaces = Surfaces::new(&materials, &textures);
+    let eye = DVec3::new(0.5, 0.5, 0.0) - forward * 2.0;
+    let camera = Camera::new(eye, forward, projection, [64, 64]);
+    let t = Thresholds { finest: PixelArea(0.0), largest: PixelArea(largest), depth_bias: PixelArea(0.0) };
+    let style = Style { samples: 4, light: Light::Albedo };
+    draw_points(&block, Some(&surfaces), &camera, &t, &style)
+}
+
+const ORTHO: Projection = Projection::Orthographic { height: 2.0 };
+
+#[test]
+fn triangles_cover_what_their_texture_shows() {
+    let pack = baked(&card(), 0.02);
+    let (p, drawn) = picture(&pack, -DVec3::Z, 0.0, ORTHO);
+    assert_eq!(drawn, Drawn { points: 0, triangles: 2 });
+    // Half of a quarter of the picture.
+    assert!((p.mean_coverage() - 0.125).abs() < 0.002, "{}", p.mean_coverage());
+    // The texture's covered top left quarter is at the top left of the square.
+    assert_eq!(p.pixels[20 * 64 + 20][3], 1.0);
+    assert_eq!(p.pixels[20 * 64 + 40][3], 0.0);
+    assert!((p.pixels[20 * 64 + 20][0] - srgb8_to_linear(200)).abs() < 0.01);
+}
+
+#[test]
+fn points_cover_as_much_as_triangles_from_every_side() {
+    let pack = baked(&card(), 0.01);
+    for forward in [-DVec3::Z, DVec3::new(-0.6, 0.0, -0.8), DVec3::new(0.9, 0.3, -0.3).normalize()] {
+        let (points, drawn) = picture(&pack, forward, f64::INFINITY, ORTHO);
+        let (truth, _) = picture(&pack, forward, 0.0, ORTHO);
+        assert!(drawn.points > 1000 && drawn.triangles == 0);
+        // Discs of the triangles' area lie over each other and leave gaps: less than the sum.
+        let ratio = points.mean_coverage() / truth.mean_coverage();
+        assert!((0.7..1.01).contains(&ratio), "{ratio}");
+    }
+}
+
+#[test]
+fn perspective_and_parallel_pictures_agree_far_away() {
+    let pack = baked(&card(), 0.05);
+    let fov_y = 2.0 * (0.5f64).atan(); // 2 units tall at distance 2
+    let (a, _) = picture(&pack, -DVec3::Z, 0.0, ORTHO);
+    let (b, _) = picture(&pack, -DVec3::Z, 0.0, Projection::Perspective { fov_y });
+    assert!((a.mean_coverage() - b.mean_coverage()).abs() < 1e-3);
+}
+
+#[test]
+fn an_eye_inside_the_block_clips_what_is_behind_it() {
+    let mut soup = card();
+    soup.materials[0] = Material::default();
+    for p in &mut soup.positions {
+        *p = Vec3::new((p.x - 0.5) * 10.0 + 0.5, 0.0, (p.y - 0.5) * 10.0); // a floor
+    }
+    let pack = baked(&soup, 0.5);
+    let block = PointsBlock::open(&pack).unwrap();
+    let (materials, textures) = forest_points::read_materials(&pack).unwrap();
+    let surfaces = Surfaces::new(&materials, &textures);
+    let projection = Projection::Perspective { fov_y: 1.0 };
+    let camera = Camera::new(DVec3::new(0.5, 0.5, 0.0), -DVec3::Z, projection, [32, 32]);
+    let t = Thresholds { finest: PixelArea(0.0), largest: PixelArea(0.0), depth_bias: PixelArea(0.0) };
+    let (p, _) = draw_points(&block, Some(&surfaces), &camera, &t, &Style::default());
+    // The floor below the horizon, nothing above; its far edge is 5 units away, 0.5 down.
+    let rows: Vec<f32> = p.pixels.chunks(32).map(|r| r[16][3]).collect();
+    assert!(rows[..16].iter().all(|&c| c == 0.0) && rows[20..].iter().all(|&c| c == 1.0), "{rows:?}");
+}

@@ -1,0 +1,119 @@
+//! Primitives become meshes of triangles.
+
+use super::accessor::Reader;
+use super::buffers::Buffers;
+use super::material::Look;
+use crate::ImportError;
+use crate::source::Source;
+use forest_soup::Mesh;
+use glam::{DVec3, Vec2, Vec3};
+use gltf::json::accessor::Type;
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root, accessor::Accessor};
+
+/// The triangles of a primitive; `None` if it is points or lines.
+pub(crate) fn mesh(
+    source: &Source,
+    root: &Root,
+    buffers: &Buffers,
+    element: &str,
+    primitive: &Primitive,
+    look: Option<&Option<Look>>,
+) -> Result<Option<Mesh>, ImportError> {
+    let others = primitive.extensions.as_ref().map(|e| &e.others);
+    let reader = Reader { source, root, buffers };
+    let attribute = |s: Semantic| primitive.attributes.get(&Checked::Valid(s)).copied();
+    let Some(position) = attribute(Semantic::Positions) else {
+        // An empty shell around compressed geometry would be a silently missing tree.
+        return Err(source.invalid(element, "no POSITION"));
+    };
+    let draco = others.is_some_and(|o| o.contains_key("KHR_draco_mesh_compression"));
+    if draco && root.get(position).is_some_and(|a| a.buffer_view.is_none()) {
+        return Err(source.unsupported(format!("{element}: KHR_draco_mesh_compression")));
+    }
+    let Checked::Valid(mode) = primitive.mode.as_ref() else {
+        return Err(source.invalid(element, "unknown primitive mode"));
+    };
+    if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+        return Ok(None);
+    }
+    let mut mesh = Mesh { name: element.into(), ..Mesh::default() };
+    let positions = reader.numbers(element, position, &[Type::Vec3], [0.0; 3])?;
+    mesh.positions = positions.iter().map(|p| DVec3::from_array(*p).as_vec3()).collect();
+    let count = mesh.positions.len();
+    let same_length = |name: &str, n: usize| {
+        if n == count { Ok(()) } else { Err(source.invalid(element, format!("{n} {name} for {count} positions"))) }
+    };
+    if let Some(accessor) = attribute(Semantic::Normals) {
+        let normals = reader.numbers(element, accessor, &[Type::Vec3], [0.0; 3])?;
+        same_length("NORMAL", normals.len())?;
+        mesh.normals = normals.iter().map(|n| unit(*n)).collect();
+    }
+    if let Some(Some(look)) = look {
+        let Some(accessor) = attribute(Semantic::TexCoords(look.uv_set)) else {
+            let problem = format!("its material's texture needs TEXCOORD_{}", look.uv_set);
+            return Err(source.invalid(element, problem));
+        };
+        let uvs = reader.numbers(element, accessor, &[Type::Vec2], [0.0; 2])?;
+        same_length("TEXCOORD", uvs.len())?;
+        mesh.uvs = uvs.iter().map(|uv| look.apply(*uv)).collect();
+    }
+    if let Some(accessor) = attribute(Semantic::Colors(0)) {
+        let kinds = [Type::Vec3, Type::Vec4];
+        let colors = reader.numbers(element, accessor, &kinds, [1.0; 4])?;
+        same_length("COLOR_0", colors.len())?;
+        mesh.colors = colors.iter().map(|c| c.map(|v| v as f32)).collect();
+    }
+    mesh.triangles = triangles(&reader, element, primitive.indices, *mode, count)?;
+    Ok(Some(mesh))
+}
+
+fn unit(n: [f64; 3]) -> Vec3 {
+    DVec3::from_array(n).normalize_or_zero().as_vec3()
+}
+
+impl Look {
+    fn apply(&self, [u, v]: [f64; 2]) -> Vec2 {
+        let [x, y] = self.transform.map(|r| r[0] * u + r[1] * v + r[2]);
+        Vec2::new(x as f32, y as f32)
+    }
+}
+
+/// Triangle corners from a list, a strip (every second triangle turned) or a fan.
+fn triangles(
+    reader: &Reader,
+    element: &str,
+    indices: Option<Index<Accessor>>,
+    mode: Mode,
+    vertices: usize,
+) -> Result<Vec<[u32; 3]>, ImportError> {
+    let invalid = |problem: String| reader.source.invalid(element, problem);
+    let order: Vec<u32> = match indices {
+        Some(accessor) => {
+            let claimed = reader.count(element, accessor)?;
+            let order = reader.indices(element, accessor)?;
+            debug_assert_eq!(claimed, order.len());
+            order
+        }
+        None => (0..vertices as u32).collect(),
+    };
+    if let Some(at) = order.iter().position(|&v| v as usize >= vertices) {
+        return Err(invalid(format!("index {at} is {}, of {vertices} vertices", order[at])));
+    }
+    Ok(match mode {
+        Mode::TriangleStrip => {
+            let turned = |(i, w): (usize, &[u32])| {
+                if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] }
+            };
+            order.windows(3).enumerate().map(turned).collect()
+        }
+        Mode::TriangleFan => {
+            order.get(1..).unwrap_or(&[]).windows(2).map(|w| [w[0], w[1], order[0]]).collect()
+        }
+        _ if order.len() % 3 != 0 => {
+            return Err(invalid(format!("{} indices are not whole triangles", order.len())));
+        }
+        _ => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+    })
+}

@@ -1,0 +1,64 @@
+//! Trees from files: glTF 2.0 and Wavefront OBJ, and blocks of several of them.
+//!
+//! [`load`] reads one file into a [`forest_soup::Model`]; [`Block`] places several. What a file
+//! needs and this crate does not know is [`ImportError::Unsupported`], naming it; a file that
+//! breaks its format's rules is [`ImportError::Invalid`], with element, value and limit. Nothing
+//! outside a file's own folder is read unless [`Limits::allow_outside`] says so.
+//!
+//! Sources: the glTF 2.0 specification and the extensions KHR_texture_transform,
+//! KHR_materials_unlit, KHR_materials_pbrSpecularGlossiness (base colour), KHR_mesh_quantization,
+//! EXT_mesh_gpu_instancing, EXT_meshopt_compression, EXT_texture_webp; the Wavefront OBJ and MTL
+//! notes of P. Bourke.
+//!
+//! ```
+//! let dir = tempfile::tempdir().unwrap();
+//! let path = dir.path().join("leaf.obj");
+//! std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n").unwrap();
+//! let leaf = forest_import::load(&path, &forest_import::Limits::default()).unwrap();
+//! assert_eq!(leaf.model.triangle_count(), 2);
+//! ```
+
+mod block;
+mod error;
+mod gltf;
+mod obj;
+mod picture;
+mod source;
+
+pub use block::{Block, LoadedBlock, Part};
+pub use error::ImportError;
+pub use source::Limits;
+
+use forest_soup::Model;
+use source::Source;
+use std::path::Path;
+
+/// A file and everything it refers to, read.
+#[derive(Debug)]
+pub struct Imported {
+    /// Meshes, instances, materials, textures.
+    pub model: Model,
+    /// BLAKE3 over the file and all files it refers to, in the order of reading.
+    pub hash: [u8; 32],
+    /// What was odd but could be read.
+    pub warnings: Vec<String>,
+}
+
+/// Reads one tree; the format is told by the extension (`.glb`, `.gltf`, `.obj`).
+///
+/// # Errors
+/// When a file cannot be read, breaks its format's rules, or needs what is not supported.
+pub fn load(path: &Path, limits: &Limits) -> Result<Imported, ImportError> {
+    let mut source = Source::open(path, *limits)?;
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let model = match extension.as_deref() {
+        Some("glb" | "gltf") => gltf::load(&mut source)?,
+        Some("obj") => obj::load(&mut source)?,
+        other => {
+            let what = format!("the format {:?} (known: glb, gltf, obj)", other.unwrap_or(""));
+            return Err(ImportError::unsupported(path, what));
+        }
+    };
+    let (hash, warnings) = source.finish();
+    Ok(Imported { model, hash, warnings })
+}
