@@ -74,7 +74,7 @@ pub(crate) struct PointsOptions {
     /// Cells along x, up and z, as 4x4x4; "auto" takes 64 near-cubes for one tree, 1024 for several.
     #[arg(long, default_value = "auto", value_name = "XxYxZ")]
     grid: String,
-    /// Largest extent of the finest points in world units; "auto" is 1/384 of the height;
+    /// Largest extent of the finest points in world units; "auto" is 1/256 of the height;
     /// "triangle" makes one point of each triangle.
     #[arg(long, default_value = "auto", value_name = "LENGTH")]
     surfel_size: String,

@@ -31,7 +31,7 @@ pub enum Order {
 /// How large the finest points may be.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum SurfelSize {
-    /// From the block's shape: 1/384 of its height (at least 1/4096 of its diagonal).
+    /// From the block's shape: 1/256 of its height (at least 1/4096 of its diagonal).
     #[default]
     Auto,
     /// One surfel for each triangle, however large.

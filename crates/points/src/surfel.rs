@@ -3,10 +3,14 @@
 //! A surfel is a disc of its triangle's area, at its centroid, with its normal; its colour is the
 //! integral of the texture over the triangle, in linear light and weighted by coverage, and its
 //! opacity the mean coverage (the paper has no opacity). A triangle that is too large, or whose
-//! texture is too uneven, is first cut into 2^k pieces of equal area by bisecting longest edges;
-//! its surfels then all have one size, which is also the size at which the triangle itself takes
-//! over. The pieces of textured triangles are cached by texture coordinates: leaves share them.
+//! texture is too uneven, is first cut: into 2^k pieces of equal area by bisecting longest edges or,
+//! if it is a long thin piece of wood, into slices along its length. Its surfels all have one size
+//! (smaller slices a lower opacity), which is also the size at which the triangle itself takes over.
+//! The pieces of textured triangles are cached by texture coordinates: leaves share them.
 
+mod slices;
+
+use self::slices::Slices;
 use crate::frame::BlockFrame;
 use crate::options::{BakeOptions, SurfelSize};
 use forest_soup::{AlphaMode, Material, ShadedTexture, TriangleSoup};
@@ -38,9 +42,13 @@ impl Surfel {
 /// No triangle is cut into more than 2^this pieces.
 const MAX_DEPTH: u32 = 12;
 
-/// Opaque triangles are cut until their pieces are this many surfel sizes long: their colour
-/// varies slowly, only their shape matters.
-const OPAQUE_LENGTH: f64 = 4.0;
+/// Opaque triangles are cut until their pieces have at most the area of this many surfel sizes
+/// squared: their colour varies slowly, only their shape matters.
+const OPAQUE_AREA: f64 = 4.0;
+
+/// Translucent pieces are not longer than this many surfel sizes. Bisection to half the length takes
+/// a quarter of the area, so that a smaller number would cut thin cards to dust.
+const LENGTH: f64 = 16.0;
 
 /// Smaller triangles (in block units²) are dropped as having no area.
 const SMALLEST_AREA: f64 = 1.0 / (1u64 << 52) as f64;
@@ -56,7 +64,7 @@ pub(crate) struct SurfelShader<'a> {
     soup: &'a TriangleSoup,
     frame: BlockFrame,
     shades: Vec<Shade>,
-    /// Longest edge of a translucent piece, in block units.
+    /// Square root of the area of a translucent piece, in block units.
     size: f64,
     tolerance: f64,
 }
@@ -96,7 +104,7 @@ impl<'a> SurfelShader<'a> {
         let size = match options.surfel_size {
             SurfelSize::Auto => {
                 let b = frame.bounds.size();
-                (b.y / 384.0).max(b.length() / 4096.0)
+                (b.y / 256.0).max(b.length() / 4096.0)
             }
             SurfelSize::Triangle => f64::INFINITY,
             SurfelSize::Units(s) => frame.length(s),
@@ -141,10 +149,12 @@ struct Key {
     depth: [u8; 2],
 }
 
-/// One piece of a triangle: its centroid (weights of corners 1 and 2) and what it shows.
+/// One piece of a triangle: its centroid (weights of corners 1 and 2), its area over that of the
+/// largest piece, and what it shows.
 #[derive(Clone, Copy)]
 struct Piece {
     at: [f32; 2],
+    area: f32,
     /// Premultiplied linear RGBA.
     rgba: [f32; 4],
 }
@@ -172,9 +182,10 @@ impl<'a> SurfelMaker<'a> {
         let material = s.soup.triangle_materials[i];
         let shade = &s.shades[material as usize];
         let edges = [a.distance_squared(b), b.distance_squared(c), c.distance_squared(a)];
-        let pieces = self.pieces(i, material, shade, edges);
+        let pieces = self.pieces(i, material, shade, edges, area);
         let colors = vertex_colors(s.soup, i);
-        let piece_area = (area / pieces.list().len() as f64) as f32;
+        let shares: f32 = pieces.list().iter().map(|p| p.area).sum();
+        let largest = (area / f64::from(shares)) as f32;
         let before = out.len();
         for piece in pieces.list() {
             let [u, v] = piece.at.map(f64::from);
@@ -182,7 +193,8 @@ impl<'a> SurfelMaker<'a> {
             if rgba[3] > 0.0 {
                 let position = (a + (b - a) * u + (c - a) * v).as_vec3().to_array();
                 let rgb = std::array::from_fn(|k| rgba[k] / rgba[3]);
-                out.push(Surfel { position, axis, area: piece_area, rgb, opacity: rgba[3] });
+                let opacity = rgba[3] * piece.area;
+                out.push(Surfel { position, axis, area: largest, rgb, opacity });
             }
         }
         match out.len() - before {
@@ -191,31 +203,36 @@ impl<'a> SurfelMaker<'a> {
         }
     }
 
-    fn pieces(&mut self, i: usize, material: u16, shade: &Shade, edges: [f64; 3]) -> Pieces {
-        let longest = edges.into_iter().fold(0.0, f64::max).sqrt();
+    fn pieces(
+        &mut self,
+        i: usize,
+        material: u16,
+        shade: &Shade,
+        edges: [f64; 3],
+        area: f64,
+    ) -> Pieces {
         let size = self.shader.size;
-        let least = if longest <= OPAQUE_LENGTH * size {
-            0
-        } else {
-            depth_for_length(edges, OPAQUE_LENGTH * size)
-        };
         let uv = triangle_uv(self.shader.soup, i);
         let Some(texture) = shade.texture.as_ref().filter(|_| shade.translucent) else {
             let rgba = |uv| match &shade.texture {
                 Some(texture) => texture.integrate(uv, OPAQUE_SAMPLES),
                 None => shade.color,
             };
-            return match least {
+            if let Some(slices) = Slices::of(edges, area, size) {
+                return Pieces::Many(slices.cut(|part| rgba(part_uv(uv, part))));
+            }
+            return match depth_for_area(area, OPAQUE_AREA * size * size) {
                 0 => Pieces::whole(rgba(uv)),
                 depth => Pieces::Many(cut(edges, depth, |part| rgba(part_uv(uv, part)))),
             };
         };
-        let greatest = if longest <= size { 0 } else { depth_for_length(edges, size) };
+        let by_length = depth_for_length(edges, LENGTH * size);
+        let greatest = by_length.max(depth_for_area(area, size * size));
         let key = Key {
             material,
             uv: bytemuck::cast(uv),
             shape: [shape_step(edges[0], edges[2]), shape_step(edges[1], edges[2])],
-            depth: [least.min(greatest) as u8, greatest as u8],
+            depth: [by_length as u8, greatest as u8],
         };
         let slot = key.slot();
         if let Some((k, list)) = &self.cache[slot]
@@ -244,7 +261,7 @@ impl Pieces {
     }
 
     fn whole(rgba: [f32; 4]) -> Self {
-        Self::One([Piece { at: [1.0 / 3.0; 2], rgba }])
+        Self::One([Piece { at: [1.0 / 3.0; 2], area: 1.0, rgba }])
     }
 }
 
@@ -253,7 +270,7 @@ fn cut(edges: [f64; 3], depth: u32, rgba: impl Fn(Part) -> [f32; 4]) -> Rc<[Piec
     let mut list = Vec::with_capacity(1 << depth);
     bisect(WHOLE, edges, depth, &mut |part| {
         let at = ((part[0] + part[1] + part[2]) / 3.0).to_array();
-        list.push(Piece { at, rgba: rgba(part) });
+        list.push(Piece { at, area: 1.0, rgba: rgba(part) });
     });
     list.into()
 }
@@ -321,9 +338,17 @@ fn halves([a, b, c]: [f64; 3]) -> [[f64; 3]; 2] {
     [[0.25 * a, median, c], [0.25 * a, b, median]]
 }
 
+/// The least depth at which pieces have at most this area.
+fn depth_for_area(area: f64, limit: f64) -> u32 {
+    (area / limit).log2().ceil().clamp(0.0, f64::from(MAX_DEPTH)) as u32
+}
+
 /// The least depth at which all pieces have edges of at most `length`.
 fn depth_for_length(edges: [f64; 3], length: f64) -> u32 {
     let limit = length * length;
+    if edges.iter().all(|&e| e <= limit) {
+        return 0;
+    }
     let mut shapes = vec![edges];
     for depth in 0..MAX_DEPTH {
         shapes.retain(|e| e.iter().any(|&x| x > limit));
@@ -352,7 +377,9 @@ fn shape_step(a: f64, b: f64) -> i16 {
 impl Key {
     fn slot(&self) -> usize {
         let mut hash = u64::from(self.material) ^ 0x9e37_79b9_7f4a_7c15;
-        for word in self.uv {
+        let [a, b] = self.shape.map(|s| u32::from(s as u16));
+        let rest = [a << 16 | b, u32::from(self.depth[0]) << 8 | u32::from(self.depth[1])];
+        for &word in self.uv.iter().chain(&rest) {
             hash = (hash ^ u64::from(word)).wrapping_mul(0xff51_afd7_ed55_8ccd);
             hash ^= hash >> 32;
         }

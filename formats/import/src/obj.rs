@@ -19,7 +19,13 @@ use std::sync::Arc;
 /// Reads an `.obj` and its material libraries.
 pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
     let bytes = std::mem::take(&mut source.bytes);
-    let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
+    // Lines and points have no area.
+    let options = tobj::LoadOptions {
+        single_index: true,
+        ignore_lines: true,
+        ignore_points: true,
+        ..tobj::LoadOptions::default()
+    };
     // The parser asks for material libraries while it reads: note what went wrong with them.
     let failed = RefCell::new(None);
     let shared = RefCell::new(&mut *source);
@@ -116,10 +122,6 @@ struct Polygons {
 
 impl Polygons {
     fn triangulate(&mut self, positions: &[Vec3], face: &[u32], out: &mut Vec<[u32; 3]>) {
-        // Points and lines have no area.
-        if face.len() < 3 {
-            return;
-        }
         if let &[a, b, c] = face {
             return out.push([a, b, c]);
         }

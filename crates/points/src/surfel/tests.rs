@@ -50,7 +50,7 @@ fn a_triangle_becomes_a_disc_of_its_area_at_its_centroid() {
 fn a_smaller_surfel_size_cuts_into_equal_areas() {
     let soup = soup(None, AlphaMode::Opaque);
     let (s, _) = surfels_of(&soup, SurfelSize::Units(0.1));
-    // Opaque pieces may be 0.4 long: √2/2^(k/2) ≤ 0.4 for k = 4.
+    // Opaque pieces may have 4·0.1² of area: 0.5/2⁴ is the first below it.
     assert_eq!(s.len(), 16);
     assert!(s.iter().all(|s| (s.area - 0.5 / 16.0).abs() < 1e-7));
     let mean = s.iter().map(|s| s.position[0]).sum::<f32>() / 16.0;
@@ -118,9 +118,9 @@ fn a_needle_of_aspect_a_million_stays_on_its_line() {
     let mut needle = soup(None, AlphaMode::Opaque);
     needle.positions[2] = Vec3::new(0.0, 1e-6, 0.0);
     let (s, _) = surfels_of(&needle, SurfelSize::Units(0.01));
-    // Pieces of at most 0.04: 1/2⁵ of the length, and equal areas then take 4⁵ of them.
-    assert_eq!(s.len(), 1024);
-    let area: f64 = s.iter().map(|s| f64::from(s.area)).sum();
+    // Slices of the surfel size along a length of 1.
+    assert_eq!(s.len(), 101);
+    let area: f64 = s.iter().map(|s| f64::from(s.area * s.opacity)).sum();
     // The half diagonal is just above ½: the block unit is 1.
     assert!((area / 0.5e-6 - 1.0).abs() < 1e-4, "{area}");
     let farthest = s.iter().map(|s| s.position[1].abs()).fold(0.0, f32::max);

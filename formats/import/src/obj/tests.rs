@@ -39,6 +39,15 @@ v 0 0 9\nv 1 0 9\nv 0 1 9\nf -3 -2 -1\n");
 }
 
 #[test]
+fn loose_edges_are_left_out() {
+    // Blender writes the edges of no face as lines; they have no texture coordinates.
+    let dir = tempfile::tempdir().unwrap();
+    write(dir.path(), "t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nvt 0 0\nl 1 4\np 2\nf 1/1 2/1 3/1\n");
+    let model = import(dir.path());
+    assert_eq!((model.triangle_count(), model.meshes[0].uvs.len()), (1, 3));
+}
+
+#[test]
 fn alpha_comes_from_map_d_from_map_kd_or_from_tr() {
     let dir = tempfile::tempdir().unwrap();
     png(dir.path(), "leaf one.png", 2, |x, _| [10, 200, 30, if x == 0 { 0 } else { 255 }]);
