@@ -11,6 +11,7 @@ use crate::principal::{Moments, principal_axis};
 use crate::record::PointRecord;
 use crate::size::SizeCode;
 use crate::surfel::Surfel;
+use crate::union;
 use glam::DVec3;
 
 /// Clusters of at most this many surfels are not split ("until fewer than 5").
@@ -76,16 +77,18 @@ pub(crate) struct Tree {
     pub(crate) records: Vec<PointRecord>,
     /// Index of each record's parent (its own for the root); kept for audits only.
     pub(crate) parents: Option<Vec<u32>>,
+    /// Nodes of the subtree being built whose union was not measured yet.
+    gathered: Vec<Node>,
 }
 
 impl Tree {
     /// A tree that remembers who is whose parent.
     pub(crate) fn with_parents() -> Self {
-        Self { records: Vec::new(), parents: Some(Vec::new()) }
+        Self { parents: Some(Vec::new()), ..Self::default() }
     }
 
     fn sibling(&self) -> Self {
-        Self { records: Vec::new(), parents: self.parents.as_ref().map(|_| Vec::new()) }
+        Self { parents: self.parents.as_ref().map(|_| Vec::new()), ..Self::default() }
     }
 
     fn push(&mut self, record: PointRecord) -> usize {
@@ -108,6 +111,7 @@ impl Tree {
     fn append(&mut self, mut other: Tree) {
         let base = self.records.len() as u32;
         self.records.append(&mut other.records);
+        self.gathered.append(&mut other.gathered);
         if let (Some(mine), Some(theirs)) = (&mut self.parents, other.parents) {
             mine.extend(theirs.into_iter().map(|p| p + base));
         }
@@ -163,6 +167,8 @@ fn split(
         (at, left)
     };
     let right = moments.without(&left);
+    let seed = items[0].index;
+    let gathered = out.gathered.len();
     let parallel = items.len() > PARALLEL;
     let (items_l, items_r) = items.split_at_mut(at);
     let (scratch_l, scratch_r) = scratch.split_at_mut(at);
@@ -181,35 +187,47 @@ fn split(
         [l, r]
     };
     let [l, r] = &children;
-    let root = Node::merged(&[l.root, r.root], rules.radius, rules.monotone);
-    adopt(rules, root, &[l.record, r.record], out)
+    merge(rules, &[l.root, r.root], &[l.record, r.record], (gathered, seed), out)
 }
 
 /// The leaves of a small cluster, and their common point if there are several.
 fn leaf_cluster(rules: &ClusterRules, items: &[Item], out: &mut Tree) -> Built {
-    let mut nodes = [None; LEAF_CLUSTER];
+    let gathered = out.gathered.len();
     let mut records = [0; LEAF_CLUSTER];
-    for (k, item) in items.iter().enumerate() {
+    for (slot, item) in records.iter_mut().zip(&*items) {
         let node = rules.leaves.node(item.index, rules.radius);
-        records[k] = out.push(record(rules, &node, true));
-        nodes[k] = Some(node);
+        *slot = out.push(record(rules, &node, true));
+        out.gathered.push(node);
     }
-    match nodes {
-        [Some(root), None, ..] => Built { root, record: records[0] },
-        [Some(a), Some(b), None, _] => merge(rules, &[a, b], &records[..2], out),
-        [Some(a), Some(b), Some(c), None] => merge(rules, &[a, b, c], &records[..3], out),
-        [Some(a), Some(b), Some(c), Some(d)] => merge(rules, &[a, b, c, d], &records, out),
-        _ => unreachable!("a cluster has at least one leaf"),
+    if let [root] = out.gathered[gathered..] {
+        return Built { root, record: records[0] };
     }
+    let mut nodes = [out.gathered[gathered]; LEAF_CLUSTER];
+    nodes[..items.len()].copy_from_slice(&out.gathered[gathered..]);
+    let seed = items[0].index;
+    merge(rules, &nodes[..items.len()], &records[..items.len()], (gathered, seed), out)
 }
 
+/// One point for `children`. The nodes gathered below it, from number `gathered` on, are measured
+/// if there are enough of them; the point then stands for them.
 fn merge(
     rules: &ClusterRules,
     children: &[Node],
     records: &[usize],
+    (gathered, seed): (usize, u32),
     out: &mut Tree,
 ) -> Built {
-    adopt(rules, Node::merged(children, rules.radius, rules.monotone), records, out)
+    let below = &out.gathered[gathered..];
+    let measured = (rules.radius == RadiusRule::Opacity && below.len() >= union::GATHERED)
+        .then(|| union::covered(below, seed));
+    let root = Node::merged(children, rules.radius, rules.monotone, measured);
+    if rules.radius != RadiusRule::Opacity {
+        out.gathered.truncate(gathered);
+    } else if measured.is_some() {
+        out.gathered.truncate(gathered);
+        out.gathered.push(root);
+    }
+    adopt(rules, root, records, out)
 }
 
 /// Appends the parent's record and tells its children its size.

@@ -65,6 +65,7 @@ pub mod spheroid;
 mod surfel;
 mod timing;
 mod triangle;
+mod union;
 mod validate;
 
 pub use audit::{CutAudit, audit};

@@ -9,7 +9,8 @@
 //!   mean squared distance from the centroid, their own extents (r²/2 for a disc) included. So
 //!   r² = 4·σ²/(2 + f²). The opacity is what is left: covered area over footprint.
 //! * Covered area, under `Area`, is the sum over children. Under `Opacity` it is the mean, over all
-//!   view directions, of the projected *union*: see [`mean_overlap`].
+//!   view directions, of the projected *union*: measured ([`crate::union`]) once a few points have
+//!   come together, and by a law of pairs ([`mean_overlap`]) below that.
 //! * `Paper`: section 4.2 of Gilet et al. 2005, spheres of radius
 //!   R = 2/π·(Rm + α·(RM − Rm)), RM = Rl + Rr, Rm = (Rl + Rr)/2, α = |Nl·Nr|.
 
@@ -75,8 +76,14 @@ impl Node {
         }
     }
 
-    /// One point for all `children` (at least two).
-    pub(crate) fn merged(children: &[Node], rule: RadiusRule, raise: bool) -> Self {
+    /// One point for all `children` (at least two). `measured` is their covered area where it
+    /// is known better than by the law of pairs; with `raise` the point is no smaller than a child.
+    pub(crate) fn merged(
+        children: &[Node],
+        rule: RadiusRule,
+        raise: bool,
+        measured: Option<f64>,
+    ) -> Self {
         let weight: f64 = children.iter().map(|c| c.weight).sum();
         let center = children.iter().map(|c| c.center * c.weight).sum::<DVec3>() / weight;
         let spread: f64 = children
@@ -109,7 +116,7 @@ impl Node {
             SizeCode::at_least(node.covered)
         } else {
             node.flatness = spheroid::step_for_alignment(node.alignment());
-            node.covered = covered_area(children, rule);
+            node.covered = measured.unwrap_or_else(|| covered_area(children, rule));
             let f = spheroid::flatness(node.flatness);
             let by_spread = 4.0 * spread / (weight * (2.0 + f * f));
             let by_area = node.covered / (PI * spheroid::mean_ratio_of_step(node.flatness));
@@ -129,11 +136,14 @@ impl Node {
     pub(crate) fn opacity(&self, rule: RadiusRule) -> f64 {
         match rule {
             RadiusRule::Paper => 1.0,
-            RadiusRule::Opacity | RadiusRule::Area => {
-                let footprint = spheroid::mean_projected_area(self.own.radius(), self.flatness, 1.0);
-                (self.covered / footprint).min(1.0)
-            }
+            RadiusRule::Opacity | RadiusRule::Area => self.cover(),
         }
+    }
+
+    /// Opacity of the drawn footprint under our rules.
+    pub(crate) fn cover(&self) -> f64 {
+        let footprint = spheroid::mean_projected_area(self.own.radius(), self.flatness, 1.0);
+        (self.covered / footprint).min(1.0)
     }
 
     /// Share of the surfels' area that faces along the axis: Σ w·(n·a)² / Σ w.

@@ -16,7 +16,7 @@ fn the_papers_formula_keeps_46_percent_of_two_equal_children_at_60_degrees() {
     let tilted = DVec3::new(0.75f64.sqrt(), 0.0, 0.5); // |N·N'| = ½
     let a = surfel_node([0.0; 3], DVec3::Z, 1e-4, RadiusRule::Paper);
     let b = surfel_node([0.01, 0.0, 0.0], tilted, 1e-4, RadiusRule::Paper);
-    let parent = Node::merged(&[a, b], RadiusRule::Paper, false);
+    let parent = Node::merged(&[a, b], RadiusRule::Paper, false, None);
     // R = 2/π·(1 + ½·(2 − 1)) = 0.9549 of a child's: 0.9119 of one area, 45.6 % of two.
     let kept = parent.radius.powi(2) / (2.0 * a.radius.powi(2));
     assert!((kept - 0.455_945).abs() < 1e-4, "{kept}");
@@ -26,7 +26,7 @@ fn the_papers_formula_keeps_46_percent_of_two_equal_children_at_60_degrees() {
 fn opposite_leaf_normals_do_not_cancel() {
     let a = leaf([0.0; 3], DVec3::Z, 1e-4);
     let b = leaf([0.01, 0.0, 0.0], -DVec3::Z, 1e-4);
-    let parent = Node::merged(&[a, b], RadiusRule::Opacity, true);
+    let parent = Node::merged(&[a, b], RadiusRule::Opacity, true, None);
     assert!(parent.axis.dot(DVec3::Z).abs() > 1.0 - 1e-12);
     assert_eq!(parent.flatness, 0);
 }
@@ -37,7 +37,7 @@ fn a_plane_of_discs_hides_nothing_of_itself() {
     let [opacity, area] = [RadiusRule::Opacity, RadiusRule::Area].map(|rule| {
         let a = leaf([0.0; 3], DVec3::Z, 1e-4);
         let b = leaf([0.012, 0.0, 0.0], DVec3::Z, 1e-4);
-        Node::merged(&[a, b], rule, true).covered
+        Node::merged(&[a, b], rule, true, None).covered
     });
     assert!((opacity - area).abs() < 1e-12);
     assert!((area - 1e-4).abs() < 1e-10); // half of 2·10⁻⁴
@@ -94,7 +94,7 @@ fn isotropic_leaves_become_a_sphere_that_keeps_their_area() {
         .collect();
     let mut level = leaves;
     while level.len() > 1 {
-        level = level.chunks(2).map(|c| Node::merged(c, RadiusRule::Area, true)).collect();
+        level = level.chunks(2).map(|c| Node::merged(c, RadiusRule::Area, true, None)).collect();
     }
     let root = level[0];
     assert!(root.flatness > 110, "{}", root.flatness);
@@ -110,6 +110,6 @@ fn colour_is_weighted_by_covered_area() {
     let big = Surfel { position: [0.0; 3], axis: [0.0, 1.0, 0.0], area: 3e-4, rgb: [1.0, 0.0, 0.0], opacity: 1.0 };
     let faint = Surfel { rgb: [0.0, 1.0, 0.0], opacity: 0.5, area: 2e-4, ..big };
     let nodes = [big, faint].map(|s| Node::of_surfel(&s, RadiusRule::Opacity));
-    let rgb = Node::merged(&nodes, RadiusRule::Opacity, true).rgb();
+    let rgb = Node::merged(&nodes, RadiusRule::Opacity, true, None).rgb();
     assert!((rgb[0] - 0.75).abs() < 1e-6 && (rgb[1] - 0.25).abs() < 1e-6, "{rgb:?}");
 }
