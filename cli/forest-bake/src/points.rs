@@ -144,6 +144,8 @@ struct Summary {
     dropped: Dropped,
     seconds: f64,
     import_seconds: f64,
+    /// From the decoded, flattened soup to the renamed pack.
+    bake_seconds: f64,
     /// Seconds by stage; those of parallel stages are summed over threads.
     stage_seconds: Vec<(&'static str, f64)>,
 }
@@ -174,6 +176,7 @@ impl Summary {
             },
             seconds,
             import_seconds: source.seconds,
+            bake_seconds: seconds - source.seconds,
             stage_seconds: report.times.stages().map(|(n, t)| (n, t.seconds())).to_vec(),
         })
     }

@@ -1,8 +1,9 @@
 //! Materials and textures as the pack holds them.
 
 use forest_pack::header::{self, MaterialHeader, Materials, TextureHeader};
-use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
+use forest_pack::{Codec, Compressed, Pack, PackError, PackWriter, SectionId, kind};
 use forest_soup::{AlphaMode, Material, Texture, Wrap};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 const ID: SectionId = SectionId::new(kind::MATERIALS, 0);
@@ -24,9 +25,12 @@ pub fn write_materials(
         textures: textures.iter().map(|t| texture_header(t)).collect(),
     };
     writer.add(ID, Codec::None, &header::encode(&table))?;
-    for (i, texture) in (0..).zip(textures) {
-        let id = SectionId::new(kind::TEXTURE, i);
-        writer.add(id, Codec::Zstd, bytemuck::cast_slice(&texture.texels))?;
+    let packed: Vec<_> = textures
+        .par_iter()
+        .map(|t| Compressed::new(bytemuck::cast_slice(&t.texels)))
+        .collect::<Result<_, _>>()?;
+    for (i, texels) in (0..).zip(&packed) {
+        writer.add_compressed(SectionId::new(kind::TEXTURE, i), texels)?;
     }
     Ok(())
 }

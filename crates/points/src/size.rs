@@ -1,6 +1,7 @@
 //! Sizes as 12-bit codes: what the arrays are sorted by and the cut is made with.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// A footprint area (π·radius², in normalised block units²) on a logarithmic scale of
 /// [`SizeCode::PER_OCTAVE`] codes to a factor of two: steps of 0.87 % in area, 0.43 % in radius,
@@ -51,8 +52,12 @@ impl SizeCode {
     }
 
     /// The radius of a disc of that area, in normalised block units.
+    #[inline]
     pub fn radius(self) -> f64 {
-        (self.area() / PI).sqrt()
+        static RADII: LazyLock<Vec<f64>> = LazyLock::new(|| {
+            (0..=SizeCode::INFINITE.0).map(|c| (SizeCode(c).area() / PI).sqrt()).collect()
+        });
+        RADII[usize::from(self.0)]
     }
 
     fn position(area: f64) -> f64 {

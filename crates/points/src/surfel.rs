@@ -53,11 +53,12 @@ const LENGTH: f64 = 16.0;
 /// Smaller triangles (in block units²) are dropped as having no area.
 const SMALLEST_AREA: f64 = 1.0 / (1u64 << 52) as f64;
 
-/// Samples (as a power of two) of a texture's integral: over an opaque triangle, over a
-/// translucent one (cached), and the least over a piece of one.
-const OPAQUE_SAMPLES: u32 = 4;
+/// Samples (as a power of two) of a texture's integral: over an opaque triangle and over a piece of
+/// one, over a translucent one (cached), and the least over a piece of that.
+const OPAQUE_SAMPLES: u32 = 3;
+const OPAQUE_PIECE_SAMPLES: u32 = 1;
 const TRANSLUCENT_SAMPLES: u32 = 9;
-const PIECE_SAMPLES: u32 = 4;
+const TRANSLUCENT_PIECE_SAMPLES: u32 = 4;
 
 /// What surfels are made with: shaded textures and limits. Shared by all threads.
 pub(crate) struct SurfelShader<'a> {
@@ -214,16 +215,17 @@ impl<'a> SurfelMaker<'a> {
         let size = self.shader.size;
         let uv = triangle_uv(self.shader.soup, i);
         let Some(texture) = shade.texture.as_ref().filter(|_| shade.translucent) else {
-            let rgba = |uv| match &shade.texture {
-                Some(texture) => texture.integrate(uv, OPAQUE_SAMPLES),
+            let rgba = |uv, samples| match &shade.texture {
+                Some(texture) => texture.integrate(uv, samples),
                 None => shade.color,
             };
+            let piece = |part| rgba(part_uv(uv, part), OPAQUE_PIECE_SAMPLES);
             if let Some(slices) = Slices::of(edges, area, size) {
-                return Pieces::Many(slices.cut(|part| rgba(part_uv(uv, part))));
+                return Pieces::Many(slices.cut(piece));
             }
             return match depth_for_area(area, OPAQUE_AREA * size * size) {
-                0 => Pieces::whole(rgba(uv)),
-                depth => Pieces::Many(cut(edges, depth, |part| rgba(part_uv(uv, part)))),
+                0 => Pieces::whole(rgba(uv, OPAQUE_SAMPLES)),
+                depth => Pieces::Many(cut(edges, depth, piece)),
             };
         };
         let by_length = depth_for_length(edges, LENGTH * size);
@@ -287,7 +289,7 @@ fn translucent_pieces(
     let [least, greatest] = key.depth.map(u32::from);
     let mut depth = least;
     loop {
-        let samples = TRANSLUCENT_SAMPLES.saturating_sub(depth).max(PIECE_SAMPLES);
+        let samples = TRANSLUCENT_SAMPLES.saturating_sub(depth).max(TRANSLUCENT_PIECE_SAMPLES);
         let pieces = cut(edges, depth, |part| texture.integrate(part_uv(uv, part), samples));
         if depth >= greatest || footprint_error(&pieces) <= tolerance {
             return pieces;

@@ -11,6 +11,7 @@ use crate::node::Node;
 use crate::spheroid;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 /// Points that are looked at together: at least this many, and less than twice as many.
 pub(crate) const GATHERED: usize = 4;
@@ -41,11 +42,10 @@ impl Seen {
         }
     }
 
-    /// The point of the ellipse at (u, w) of the unit square, area-preserving.
-    fn sample(&self, [u, w]: [f64; 2]) -> DVec2 {
-        let (sin, cos) = (w * TAU).sin_cos();
-        let r = u.sqrt() * self.radius;
-        self.center + self.minor * (r * cos * self.ratio) + self.minor.perp() * (r * sin)
+    /// The point of the ellipse at point `d` of the unit disc.
+    fn sample(&self, d: DVec2) -> DVec2 {
+        let d = d * self.radius;
+        self.center + self.minor * (d.x * self.ratio) + self.minor.perp() * d.y
     }
 
     fn contains(&self, p: DVec2) -> bool {
@@ -62,12 +62,13 @@ pub(crate) fn covered(nodes: &[Node], seed: u32) -> f64 {
     let (mut open, mut all) = (0.0, 0.0);
     let mut seen: Vec<Seen> = Vec::with_capacity(nodes.len());
     for k in 0..DIRECTIONS {
-        let (v, right, up) = frame(seed.wrapping_mul(DIRECTIONS).wrapping_add(k));
+        let View { v, right, up } = VIEWS[(seed.wrapping_mul(DIRECTIONS).wrapping_add(k) % TABLE) as usize];
         seen.clear();
         for (i, node) in (0u32..).zip(nodes) {
             let this = Seen::of(node, v, right, up);
             let area = this.radius * this.radius * this.ratio * this.opacity;
-            let p = this.sample(plane_sequence(seed.wrapping_add(i * DIRECTIONS + k)));
+            let sample = seed.wrapping_add(i * DIRECTIONS + k) % TABLE;
+            let p = this.sample(SAMPLES[sample as usize]);
             let left: f64 =
                 seen.iter().filter(|s| s.contains(p)).map(|s| 1.0 - s.opacity).product();
             open += area * left;
@@ -78,15 +79,37 @@ pub(crate) fn covered(nodes: &[Node], seed: u32) -> f64 {
     if all > 0.0 { sum * open / all } else { sum }
 }
 
-/// Direction number `k` of a sequence that fills the half sphere evenly, and a frame around it.
-fn frame(k: u32) -> (DVec3, DVec3, DVec3) {
-    let [u, w] = plane_sequence(k);
-    let (sin, cos) = (w * TAU).sin_cos();
-    let flat = (1.0 - u * u).sqrt();
-    let v = DVec3::new(flat * cos, u, flat * sin);
-    let (right, up) = v.any_orthonormal_pair();
-    (v, right, up)
+/// Entries of the tables below; a power of two, so that numbers may wrap around.
+const TABLE: u32 = 1024;
+
+/// A view direction and a frame around it.
+struct View {
+    v: DVec3,
+    right: DVec3,
+    up: DVec3,
 }
+
+/// Directions that fill the half sphere evenly.
+static VIEWS: LazyLock<Vec<View>> = LazyLock::new(|| {
+    let view = |k: u32| {
+        let [u, w] = plane_sequence(k);
+        let (sin, cos) = (w * TAU).sin_cos();
+        let flat = (1.0 - u * u).sqrt();
+        let v = DVec3::new(flat * cos, u, flat * sin);
+        let (right, up) = v.any_orthonormal_pair();
+        View { v, right, up }
+    };
+    (0..TABLE).map(view).collect()
+});
+
+/// Points that fill the unit disc evenly.
+static SAMPLES: LazyLock<Vec<DVec2>> = LazyLock::new(|| {
+    let point = |k: u32| {
+        let [u, w] = plane_sequence(k);
+        DVec2::from_angle(w * TAU) * u.sqrt()
+    };
+    (0..TABLE).map(point).collect()
+});
 
 /// The R2 sequence of M. Roberts (2018): point number `k` of an even filling of the unit square.
 fn plane_sequence(k: u32) -> [f64; 2] {
@@ -135,7 +158,7 @@ mod tests {
         let r = nodes[0].own.radius();
         let (mut hits, n, directions) = (0u32, 60, 400);
         for k in 0..directions {
-            let (v, right, up) = frame(k);
+            let View { v, right, up } = VIEWS[k as usize];
             let seen = nodes.each_ref().map(|n| Seen::of(n, v, right, up));
             for i in 0..n * n {
                 let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n) * 4.0 * r - 2.0 * r;

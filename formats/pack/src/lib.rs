@@ -33,4 +33,4 @@ pub use kind::SectionId;
 pub use layout::{ALIGNMENT, Codec, VERSION};
 pub use reader::{Pack, Section};
 pub use spool::Spool;
-pub use writer::PackWriter;
+pub use writer::{Compressed, PackWriter};

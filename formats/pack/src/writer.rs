@@ -1,7 +1,7 @@
 //! Writing: beside the target, then renamed over it.
 
 use crate::layout::{
-    ALIGNMENT, Codec, FileHeader, MAGIC, TableEntry, VERSION, section_hash, table_hash,
+    ALIGNMENT, Codec, ENTRY_HASH, FileHeader, MAGIC, TableEntry, VERSION, section_hash, table_hash,
 };
 use crate::{Pack, PackError, SectionId, Spool};
 use bytemuck::Zeroable;
@@ -12,6 +12,26 @@ use tempfile::NamedTempFile;
 
 /// zstd level: higher ones gain almost nothing on texels and cost ten times the time.
 const ZSTD_LEVEL: i32 = 1;
+
+/// A section's bytes as one zstd frame.
+pub struct Compressed {
+    stored: Vec<u8>,
+    length: u64,
+    hash: [u8; ENTRY_HASH],
+}
+
+impl Compressed {
+    /// Compresses `data`.
+    ///
+    /// # Errors
+    /// When zstd runs out of memory.
+    pub fn new(data: &[u8]) -> Result<Self, PackError> {
+        let failed = PackError::io(Path::new("section"), "zstd failed");
+        let stored = zstd::bulk::compress(data, ZSTD_LEVEL).map_err(failed)?;
+        let hash = section_hash(&stored);
+        Ok(Self { stored, length: data.len() as u64, hash })
+    }
+}
 
 /// Writes a pack to a temporary file beside its target; [`PackWriter::finish`] renames it. Dropped
 /// before that, it leaves nothing.
@@ -51,16 +71,21 @@ impl PackWriter {
     /// # Errors
     /// When the id is taken or the disk is full.
     pub fn add(&mut self, id: SectionId, codec: Codec, data: &[u8]) -> Result<(), PackError> {
-        let packed;
-        let stored = match codec {
-            Codec::None => data,
-            Codec::Zstd => {
-                packed = zstd::bulk::compress(data, ZSTD_LEVEL)
-                    .map_err(PackError::io(&self.target, "zstd failed"))?;
-                &packed
-            }
-        };
-        self.begin(id, codec, stored.len() as u64, data.len() as u64, section_hash(stored))?;
+        if codec == Codec::Zstd {
+            return self.add_compressed(id, &Compressed::new(data)?);
+        }
+        let length = data.len() as u64;
+        self.begin(id, Codec::None, length, length, section_hash(data))?;
+        self.put(data)
+    }
+
+    /// Adds a section that was compressed before: on other threads, say.
+    ///
+    /// # Errors
+    /// When the id is taken or the disk is full.
+    pub fn add_compressed(&mut self, id: SectionId, data: &Compressed) -> Result<(), PackError> {
+        let Compressed { stored, length, hash } = data;
+        self.begin(id, Codec::Zstd, stored.len() as u64, *length, *hash)?;
         self.put(stored)
     }
 
@@ -121,7 +146,7 @@ impl PackWriter {
         codec: Codec,
         stored_length: u64,
         length: u64,
-        hash: [u8; crate::layout::ENTRY_HASH],
+        hash: [u8; ENTRY_HASH],
     ) -> Result<(), PackError> {
         if self.table.iter().any(|e| (e.kind, e.index) == (id.kind, id.index)) {
             return Err(PackError::invalid(&self.target, id, "the section was already written"));
