@@ -143,11 +143,19 @@ fn write(args: &Args, pictures: &[Picture]) -> Result<()> {
     };
     if args.alpha {
         let rows: Vec<_> = pictures.iter().map(Picture::straight).collect();
-        let at = |x: u32, y: u32| image::Rgba(rows[(x / side) as usize][(y * side + x % side) as usize]);
-        image::RgbaImage::from_fn(side * n, side, at).save(&args.output).map_err(file).with_context(name)
+        let at =
+            |x: u32, y: u32| image::Rgba(rows[(x / side) as usize][(y * side + x % side) as usize]);
+        image::RgbaImage::from_fn(side * n, side, at)
+            .save(&args.output)
+            .map_err(file)
+            .with_context(name)
     } else {
         let rows: Vec<_> = pictures.iter().map(|p| p.over(BACKGROUND)).collect();
-        let at = |x: u32, y: u32| image::Rgb(rows[(x / side) as usize][(y * side + x % side) as usize]);
-        image::RgbImage::from_fn(side * n, side, at).save(&args.output).map_err(file).with_context(name)
+        let at =
+            |x: u32, y: u32| image::Rgb(rows[(x / side) as usize][(y * side + x % side) as usize]);
+        image::RgbImage::from_fn(side * n, side, at)
+            .save(&args.output)
+            .map_err(file)
+            .with_context(name)
     }
 }

@@ -6,7 +6,6 @@ use forest_points::BakeError;
 use forest_soup::FlattenError;
 use std::process::ExitCode;
 
-
 /// Wrong usage.
 pub(crate) const USAGE: ExitCode = ExitCode::FAILURE; // 1
 

@@ -118,7 +118,13 @@ impl Report {
 
     fn text(&self) -> Result<String, std::fmt::Error> {
         let mut t = String::new();
-        writeln!(t, "{}: {}, by {}", self.file.display(), output::bytes(self.bytes), self.generator)?;
+        writeln!(
+            t,
+            "{}: {}, by {}",
+            self.file.display(),
+            output::bytes(self.bytes),
+            self.generator
+        )?;
         writeln!(t, "source {}", self.source_hash)?;
         for s in &self.sources {
             let at = if s.placement.is_empty() { "" } else { " at " };
@@ -131,7 +137,11 @@ impl Report {
         for s in &self.sections {
             let name = format!("{}[{}]", s.name, s.index);
             let stored = output::bytes(s.stored_bytes);
-            let packed = if s.codec == "none" { String::new() } else { format!(" ({} of {})", s.codec, output::bytes(s.bytes)) };
+            let packed = if s.codec == "none" {
+                String::new()
+            } else {
+                format!(" ({} of {})", s.codec, output::bytes(s.bytes))
+            };
             writeln!(t, "  {name:<26} {stored:>12}{packed}")?;
         }
         Ok(t)
@@ -144,7 +154,8 @@ impl PointsReport {
         let world = |v: [f64; 3]| block.to_world(v.into()).to_array();
         let scale = block.scale();
         let radii = block.points.iter().map(|p| p.own());
-        let radius = |code: Option<forest_points::SizeCode>| code.map_or(0.0, |c| c.radius() * scale);
+        let radius =
+            |code: Option<forest_points::SizeCode>| code.map_or(0.0, |c| c.radius() * scale);
         Self {
             min: world(h.min),
             max: world(h.max),
@@ -175,10 +186,19 @@ impl PointsReport {
         if let Some(dropped) = c.dropped() {
             writeln!(t, "  left out            {dropped}")?;
         }
-        writeln!(t, "  surfels, points     {}, {}", output::count(c.surfels), output::count(c.points))?;
+        writeln!(
+            t,
+            "  surfels, points     {}, {}",
+            output::count(c.surfels),
+            output::count(c.points)
+        )?;
         writeln!(t, "  triangles stored    {}", output::count(self.triangles as u64))?;
         match self.surfel_size {
-            Some(s) => writeln!(t, "  surfel size         {s:.4}, alpha footprint within {}", self.alpha_tolerance)?,
+            Some(s) => writeln!(
+                t,
+                "  surfel size         {s:.4}, alpha footprint within {}",
+                self.alpha_tolerance
+            )?,
             None => writeln!(t, "  surfel size         one a triangle")?,
         }
         let [finest, coarsest] = self.radius_range;

@@ -80,7 +80,11 @@ fn text(tables: &[Table]) -> Result<String, std::fmt::Error> {
     let mut t = String::new();
     for table in tables {
         writeln!(t, "{}", table.name)?;
-        writeln!(t, "  {:>12} {:>12} {:>10} {:>12} {:>9} {:>9}", "s_m (area)", "points", "area kept", "with ancest.", "missing", "doubled")?;
+        writeln!(
+            t,
+            "  {:>12} {:>12} {:>10} {:>12} {:>9} {:>9}",
+            "s_m (area)", "points", "area kept", "with ancest.", "missing", "doubled"
+        )?;
         let mut last = u64::MAX;
         for r in table.rows.iter().filter(|r| std::mem::replace(&mut last, r.points) != r.points) {
             writeln!(

@@ -159,7 +159,12 @@ struct Dropped {
 }
 
 impl Summary {
-    fn new(output: &Path, source: &LoadedSource, report: &BakeReport, seconds: f64) -> Result<Self> {
+    fn new(
+        output: &Path,
+        source: &LoadedSource,
+        report: &BakeReport,
+        seconds: f64,
+    ) -> Result<Self> {
         let c = report.header.counts;
         Ok(Self {
             output: output.into(),

@@ -100,7 +100,8 @@ impl PointsOptions {
             text => {
                 let cells: Option<Vec<u32>> = text.split('x').map(|n| n.parse().ok()).collect();
                 let cells = cells.and_then(|c| <[u32; 3]>::try_from(c).ok());
-                let wrong = || Usage(format!("--grid {text:?}: three numbers like 4x4x4, or \"auto\""));
+                let wrong =
+                    || Usage(format!("--grid {text:?}: three numbers like 4x4x4, or \"auto\""));
                 GridChoice::Fixed(cells.ok_or_else(wrong)?)
             }
         };

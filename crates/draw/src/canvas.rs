@@ -106,7 +106,12 @@ impl Band {
     }
 
     /// Visits the samples of a box: their middle, their coordinates, their place.
-    fn visit(&mut self, min: DVec2, max: DVec2, mut each: impl FnMut(DVec2, u32, u32, &mut Sample)) {
+    fn visit(
+        &mut self,
+        min: DVec2,
+        max: DVec2,
+        mut each: impl FnMut(DVec2, u32, u32, &mut Sample),
+    ) {
         // The first sample whose middle (at +½) is inside, and the one after the last.
         let range = |lo: f64, hi: f64, from: u32, to: u32| {
             let first = (lo - 0.5).ceil().clamp(f64::from(from), f64::from(to)) as u32;

@@ -145,7 +145,8 @@ impl Projector<'_> {
             }
         };
         let corners = [corner(0), corner(1), corner(2)];
-        let normal = (corners[0].normal + corners[1].normal + corners[2].normal).normalize_or(DVec3::Y);
+        let normal =
+            (corners[0].normal + corners[1].normal + corners[2].normal).normalize_or(DVec3::Y);
         let light = if surface.is_unlit() { 1.0 } else { self.style.light.factor(normal) };
         let visible = self.clipped(&corners);
         for k in 1..visible.len().saturating_sub(1) {

@@ -98,7 +98,8 @@ impl Surface {
             AlphaMode::Opaque => AlphaMode::Opaque,
             AlphaMode::Mask { .. } | AlphaMode::Blend => AlphaMode::Blend,
         };
-        let whole = Material { alpha_mode: raw, base_color: with_alpha(material, 1.0), ..material.clone() };
+        let whole =
+            Material { alpha_mode: raw, base_color: with_alpha(material, 1.0), ..material.clone() };
         let texture = material.texture.map(|t| ShadedTexture::new(&textures[t as usize], &whole));
         Self { material: material.clone(), texture }
     }

@@ -108,13 +108,12 @@ impl Sums {
 fn sums(tree: &Tree, threshold: f64, ratio: f64, order: Order) -> Sums {
     let parents = tree.parents.as_ref().expect("an audited tree has parents");
     let fine = SizeCode::at_most(threshold);
-    let range = SizeCode::at_least(threshold)..=SizeCode::at_most(threshold * ratio).unwrap_or(SizeCode::MIN);
+    let range = SizeCode::at_least(threshold)
+        ..=SizeCode::at_most(threshold * ratio).unwrap_or(SizeCode::MIN);
     let draws = |i: usize| {
         let p = &tree.records[i];
         match order {
-            Order::Exact => {
-                Some(p.parent()) > fine && (p.is_leaf() || Some(p.own()) <= fine)
-            }
+            Order::Exact => Some(p.parent()) > fine && (p.is_leaf() || Some(p.own()) <= fine),
             Order::Paper => range.contains(&p.own()),
         }
     };

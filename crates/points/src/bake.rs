@@ -146,10 +146,7 @@ pub(crate) struct Preparation<'a> {
 }
 
 impl<'a> Preparation<'a> {
-    pub(crate) fn new(
-        soup: &'a TriangleSoup,
-        options: &'a BakeOptions,
-    ) -> Result<Self, BakeError> {
+    pub(crate) fn new(soup: &'a TriangleSoup, options: &'a BakeOptions) -> Result<Self, BakeError> {
         check(options)?;
         soup.validate()?;
         let mut times = StageTimes::default();
@@ -195,7 +192,11 @@ fn check(options: &BakeOptions) -> Result<(), BakeError> {
     if let crate::GridChoice::Fixed(n) = options.grid
         && (n.contains(&0) || n.iter().map(|&n| u64::from(n)).product::<u64>() > 1 << 20)
     {
-        return fail("--grid", format!("{n:?}"), "at least 1 along each axis and 2^20 cells in all");
+        return fail(
+            "--grid",
+            format!("{n:?}"),
+            "at least 1 along each axis and 2^20 cells in all",
+        );
     }
     Ok(())
 }

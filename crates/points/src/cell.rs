@@ -57,8 +57,7 @@ impl CellBaker<'_> {
         counts: &mut BakeCounts,
         times: &mut StageTimes,
     ) -> Option<BakedCell> {
-        let (surfels, kept) =
-            times.surfels.time(|| self.surfels(triangles, maker, counts));
+        let (surfels, kept) = times.surfels.time(|| self.surfels(triangles, maker, counts));
         if surfels.is_empty() {
             return None;
         }

@@ -4,8 +4,8 @@
 //! eigenvector, until fewer than five surfels are left. Every node becomes a point; the records of
 //! a tree lie in post-order, children before their parent.
 
-use crate::node::Node;
 use crate::lattice::Quantiser;
+use crate::node::Node;
 use crate::options::RadiusRule;
 use crate::principal::{Moments, principal_axis};
 use crate::record::PointRecord;
@@ -194,7 +194,7 @@ fn split(
 fn leaf_cluster(rules: &ClusterRules, items: &[Item], out: &mut Tree) -> Built {
     let gathered = out.gathered.len();
     let mut records = [0; LEAF_CLUSTER];
-    for (slot, item) in records.iter_mut().zip(&*items) {
+    for (slot, item) in records.iter_mut().zip(items.iter()) {
         let node = rules.leaves.node(item.index, rules.radius);
         *slot = out.push(record(rules, &node, true));
         out.gathered.push(node);
@@ -231,12 +231,7 @@ fn merge(
 }
 
 /// Appends the parent's record and tells its children its size.
-fn adopt(
-    rules: &ClusterRules,
-    root: Node,
-    children: &[usize],
-    out: &mut Tree,
-) -> Built {
+fn adopt(rules: &ClusterRules, root: Node, children: &[usize], out: &mut Tree) -> Built {
     let parent = out.push(record(rules, &root, false));
     for &child in children {
         out.set_parent(child, parent);

@@ -65,11 +65,7 @@ impl std::fmt::Display for BakeCounts {
 impl BakeCounts {
     /// Triangles that are represented.
     pub fn triangles(&self) -> u64 {
-        self.source_triangles
-            - self.non_finite
-            - self.zero_area
-            - self.duplicate
-            - self.transparent
+        self.source_triangles - self.non_finite - self.zero_area - self.duplicate - self.transparent
     }
 
     /// What was dropped and why, or `None` if nothing was.

@@ -52,7 +52,9 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
             0 => AlphaMode::Opaque,
             1 => AlphaMode::Mask { cutoff: m.alpha_cutoff },
             2 => AlphaMode::Blend,
-            other => return Err(invalid(format!("material {i} has alpha mode {other}; 0–2 exist"))),
+            other => {
+                return Err(invalid(format!("material {i} has alpha mode {other}; 0–2 exist")));
+            }
         };
         materials.push(Material {
             name: m.name,

@@ -86,10 +86,8 @@ impl Node {
     ) -> Self {
         let weight: f64 = children.iter().map(|c| c.weight).sum();
         let center = children.iter().map(|c| c.center * c.weight).sum::<DVec3>() / weight;
-        let spread: f64 = children
-            .iter()
-            .map(|c| c.spread + c.weight * c.center.distance_squared(center))
-            .sum();
+        let spread: f64 =
+            children.iter().map(|c| c.spread + c.weight * c.center.distance_squared(center)).sum();
         let mut orientation = [0.0; 6];
         for c in children {
             for (sum, v) in orientation.iter_mut().zip(c.orientation) {

@@ -47,9 +47,8 @@ mod tests {
     #[test]
     fn two_points_cover_independently() {
         let n = 512;
-        let both = (0..n * n).filter(|i| {
-            covers(5, i % n, i / n, 128) && covers(6, i % n, i / n, 128)
-        });
+        let both =
+            (0..n * n).filter(|i| covers(5, i % n, i / n, 128) && covers(6, i % n, i / n, 128));
         let got = both.count() as f64 / f64::from(n * n);
         assert!((got - 0.252).abs() < 0.004, "{got}");
     }

@@ -81,8 +81,8 @@ impl PointRecord {
     }
 
     pub(crate) fn set_parent(&mut self, parent: SizeCode) {
-        self.bits = self.bits & !(CODE_MASK << PARENT_SHIFT)
-            | u32::from(parent.bits()) << PARENT_SHIFT;
+        self.bits =
+            self.bits & !(CODE_MASK << PARENT_SHIFT) | u32::from(parent.bits()) << PARENT_SHIFT;
     }
 
     /// A record without a parent; `opacity` is clamped to 1/255..=1 (a point that never shows
@@ -150,10 +150,7 @@ mod tests {
         assert_eq!(r.rgb, [255, 0, 188]);
         // The worked example of SPEC.md, section 5.3.
         let bytes: [u8; 16] = bytemuck::cast(r);
-        assert_eq!(
-            bytes,
-            [1, 0, 2, 0, 3, 0, 128, 128, 255, 0, 188, 128, 0xbc, 0x3a, 0x12, 0xd5]
-        );
+        assert_eq!(bytes, [1, 0, 2, 0, 3, 0, 128, 128, 255, 0, 188, 128, 0xbc, 0x3a, 0x12, 0xd5]);
     }
 
     #[test]

@@ -411,9 +411,8 @@ fn vertex_colors(soup: &TriangleSoup, i: usize) -> Option<[[f32; 4]; 3]> {
 /// vertex alpha the coverage is counted anew, over the whole triangle's texture.
 fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f32; 4] {
     let [u, v] = piece.at;
-    let color: [f32; 4] = std::array::from_fn(|k| {
-        colors[0][k] * (1.0 - u - v) + colors[1][k] * u + colors[2][k] * v
-    });
+    let color: [f32; 4] =
+        std::array::from_fn(|k| colors[0][k] * (1.0 - u - v) + colors[1][k] * u + colors[2][k] * v);
     let index = s.soup.triangle_materials[i] as usize;
     let material = &s.soup.materials[index];
     let coverage = match (material.alpha_mode, &s.shades[index].raw) {
@@ -439,9 +438,7 @@ fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f
             });
         }
     };
-    std::array::from_fn(|k| {
-        piece.rgba[k] * coverage * if k == 3 { 1.0 } else { color[k] }
-    })
+    std::array::from_fn(|k| piece.rgba[k] * coverage * if k == 3 { 1.0 } else { color[k] })
 }
 
 /// Direction of the surfel's axis as a vector.

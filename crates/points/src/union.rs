@@ -62,7 +62,8 @@ pub(crate) fn covered(nodes: &[Node], seed: u32) -> f64 {
     let (mut open, mut all) = (0.0, 0.0);
     let mut seen: Vec<Seen> = Vec::with_capacity(nodes.len());
     for k in 0..DIRECTIONS {
-        let View { v, right, up } = VIEWS[(seed.wrapping_mul(DIRECTIONS).wrapping_add(k) % TABLE) as usize];
+        let View { v, right, up } =
+            VIEWS[(seed.wrapping_mul(DIRECTIONS).wrapping_add(k) % TABLE) as usize];
         seen.clear();
         for (i, node) in (0u32..).zip(nodes) {
             let this = Seen::of(node, v, right, up);
@@ -125,7 +126,13 @@ mod tests {
     use crate::surfel::Surfel;
 
     fn leaf(at: [f32; 3], axis: DVec3) -> Node {
-        let s = Surfel { position: at, axis: axis.as_vec3().to_array(), area: 1e-4, rgb: [0.5; 3], opacity: 1.0 };
+        let s = Surfel {
+            position: at,
+            axis: axis.as_vec3().to_array(),
+            area: 1e-4,
+            rgb: [0.5; 3],
+            opacity: 1.0,
+        };
         Node::of_surfel(&s, RadiusRule::Opacity)
     }
 
@@ -135,8 +142,7 @@ mod tests {
 
     #[test]
     fn leaves_apart_cover_their_sum_and_coincident_ones_cover_one() {
-        let apart: Vec<Node> =
-            (0..4).map(|i| leaf([i as f32, 0.0, 0.0], DVec3::Z)).collect();
+        let apart: Vec<Node> = (0..4).map(|i| leaf([i as f32, 0.0, 0.0], DVec3::Z)).collect();
         assert!((mean(&apart) / 2e-4 - 1.0).abs() < 0.01);
         // Front and back of one leaf, twice.
         let same = vec![leaf([0.0; 3], DVec3::Z); 4];
@@ -145,7 +151,13 @@ mod tests {
 
     #[test]
     fn half_opaque_points_hide_half_as_much() {
-        let half = Surfel { position: [0.0; 3], axis: [0.0, 0.0, 1.0], area: 1e-4, rgb: [0.5; 3], opacity: 0.5 };
+        let half = Surfel {
+            position: [0.0; 3],
+            axis: [0.0, 0.0, 1.0],
+            area: 1e-4,
+            rgb: [0.5; 3],
+            opacity: 0.5,
+        };
         let nodes = vec![Node::of_surfel(&half, RadiusRule::Opacity); 2];
         // 1 − ½·½ of the footprint, whose mean is half its area.
         assert!((mean(&nodes) / (0.75 * 0.5e-4) - 1.0).abs() < 0.02, "{}", mean(&nodes));

@@ -59,11 +59,18 @@ fn header(block: &PointsBlock) -> Result<(), Broken> {
 }
 
 fn cells(block: &PointsBlock) -> Result<(), Broken> {
-    let broken = |i: usize, problem: String| Err((kind::POINTS_CELLS, format!("cell {i}: {problem}")));
+    let broken =
+        |i: usize, problem: String| Err((kind::POINTS_CELLS, format!("cell {i}: {problem}")));
     let (mut point, mut triangle, mut surfels) = (0u64, 0u64, 0u64);
     for (i, cell) in block.cells.iter().enumerate() {
         if u64::from(cell.first_point) != point || u64::from(cell.first_triangle) != triangle {
-            return broken(i, format!("starts at point {} and triangle {}; the cells before end at {point} and {triangle}", cell.first_point, cell.first_triangle));
+            return broken(
+                i,
+                format!(
+                    "starts at point {} and triangle {}; the cells before end at {point} and {triangle}",
+                    cell.first_point, cell.first_triangle
+                ),
+            );
         }
         point += u64::from(cell.points);
         triangle += u64::from(cell.triangles);
@@ -71,16 +78,31 @@ fn cells(block: &PointsBlock) -> Result<(), Broken> {
         if cell.center.iter().any(|v| v.is_nan() || v.abs() > 1.5)
             || !(0.0..=2.0).contains(&cell.radius)
         {
-            return broken(i, format!("centre {:?}, radius {}: outside the block", cell.center, cell.radius));
+            return broken(
+                i,
+                format!("centre {:?}, radius {}: outside the block", cell.center, cell.radius),
+            );
         }
         if cell.step_shift > 16 || cell.origin.iter().any(|v| v.unsigned_abs() > 1 << 30) {
-            return broken(i, format!("origin {:?}, step shift {} (at most 16)", cell.origin, cell.step_shift));
+            return broken(
+                i,
+                format!("origin {:?}, step shift {} (at most 16)", cell.origin, cell.step_shift),
+            );
         }
         if cell.top > 1 || cell.is_top() != (i + 1 == block.cells.len()) || cell.reserved != 0 {
-            return broken(i, format!("top {}, reserved {}; only the last cell is the top", cell.top, cell.reserved));
+            return broken(
+                i,
+                format!(
+                    "top {}, reserved {}; only the last cell is the top",
+                    cell.top, cell.reserved
+                ),
+            );
         }
         if SizeCode::from_bits(cell.root_parent).is_none() {
-            return broken(i, format!("root's parent has size {}; the limit is 4095", cell.root_parent));
+            return broken(
+                i,
+                format!("root's parent has size {}; the limit is 4095", cell.root_parent),
+            );
         }
     }
     if block.cells.is_empty() {
@@ -109,9 +131,8 @@ fn cells(block: &PointsBlock) -> Result<(), Broken> {
 
 fn points(block: &PointsBlock, i: usize, cell: &CellRecord) -> Result<(), Broken> {
     let points = block.cell_points(cell);
-    let broken = |k: usize, problem: String| {
-        Err((kind::POINTS, format!("cell {i}, point {k}: {problem}")))
-    };
+    let broken =
+        |k: usize, problem: String| Err((kind::POINTS, format!("cell {i}, point {k}: {problem}")));
     let exact = block.header.order == Order::Exact;
     let key = |p: &PointRecord| if exact { p.parent() } else { p.own() };
     let (mut leaves, mut roots) = (0u32, 0u32);
@@ -120,14 +141,20 @@ fn points(block: &PointsBlock, i: usize, cell: &CellRecord) -> Result<(), Broken
             return broken(k, "out of order".into());
         }
         if p.own() > SizeCode::MAX {
-            return broken(k, format!("size {}; the limit is {}", p.own().bits(), SizeCode::MAX.bits()));
+            return broken(
+                k,
+                format!("size {}; the limit is {}", p.own().bits(), SizeCode::MAX.bits()),
+            );
         }
         if exact && p.own() > p.parent() {
             let (own, parent) = (p.own().bits(), p.parent().bits());
             return broken(k, format!("size {own} is larger than its parent's {parent}"));
         }
         if p.opacity == 0 || p.axis.contains(&0) {
-            return broken(k, format!("opacity {}, axis {:?}: neither may be 0", p.opacity, p.axis));
+            return broken(
+                k,
+                format!("opacity {}, axis {:?}: neither may be 0", p.opacity, p.axis),
+            );
         }
         if p.is_leaf() && p.flatness_step() != 0 && block.header.radius != RadiusRule::Paper {
             return broken(k, format!("a surfel of flatness {}", p.flatness_step()));

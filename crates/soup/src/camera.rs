@@ -41,7 +41,8 @@ impl Camera {
     /// be (to −Z when looking straight down, +Z straight up).
     pub fn new(eye: DVec3, forward: DVec3, projection: Projection, size: [u32; 2]) -> Self {
         let forward = forward.normalize();
-        let pole = if forward.y.abs() > 0.999_999 { DVec3::Z * forward.y.signum() } else { DVec3::Y };
+        let pole =
+            if forward.y.abs() > 0.999_999 { DVec3::Z * forward.y.signum() } else { DVec3::Y };
         let right = forward.cross(pole).normalize();
         let up = right.cross(forward);
         Self { eye, right, up, forward, projection, width: size[0], height: size[1] }
@@ -88,7 +89,12 @@ mod tests {
     #[test]
     fn perspective_projects_by_similar_triangles() {
         let fov_y = std::f64::consts::FRAC_PI_2;
-        let c = Camera::new(DVec3::new(0.0, 0.0, 10.0), -DVec3::Z, Projection::Perspective { fov_y }, [200, 100]);
+        let c = Camera::new(
+            DVec3::new(0.0, 0.0, 10.0),
+            -DVec3::Z,
+            Projection::Perspective { fov_y },
+            [200, 100],
+        );
         // At distance 10 a 90° picture is 20 units tall: 5 pixels a unit.
         assert!((c.pixels_per_unit(10.0) - 5.0).abs() < 1e-12);
         let (x, y, z) = c.project(DVec3::new(3.0, 2.0, 0.0));

@@ -51,7 +51,9 @@ pub struct Model {
 #[non_exhaustive]
 pub enum FlattenError {
     /// Flattening would make more triangles than allowed.
-    #[error("the model has {triangles} triangles once its {instances} instances are flattened; the limit is {limit} (raise it with --max-triangles)")]
+    #[error(
+        "the model has {triangles} triangles once its {instances} instances are flattened; the limit is {limit} (raise it with --max-triangles)"
+    )]
     TooManyTriangles {
         /// Triangles after flattening.
         triangles: u64,
@@ -94,7 +96,11 @@ impl Model {
         let triangles = self.triangle_count();
         if triangles > max_triangles {
             let instances = self.instances.len();
-            return Err(FlattenError::TooManyTriangles { triangles, instances, limit: max_triangles });
+            return Err(FlattenError::TooManyTriangles {
+                triangles,
+                instances,
+                limit: max_triangles,
+            });
         }
         let Some(first) = self.instances.first().copied().filter(|_| triangles > 0) else {
             return Err(FlattenError::Empty {
@@ -109,8 +115,11 @@ impl Model {
             return Err(FlattenError::TooManyVertices { vertices, limit });
         }
         let any = |has: fn(&Mesh) -> bool| self.instances.iter().any(|i| has(mesh_of(i)));
-        let (with_normals, with_uvs, with_colors) =
-            (any(|m| !m.normals.is_empty()), any(|m| !m.uvs.is_empty()), any(|m| !m.colors.is_empty()));
+        let (with_normals, with_uvs, with_colors) = (
+            any(|m| !m.normals.is_empty()),
+            any(|m| !m.uvs.is_empty()),
+            any(|m| !m.colors.is_empty()),
+        );
 
         let mut soup = TriangleSoup {
             origin: first.placement.translation(),
@@ -190,7 +199,10 @@ mod tests {
     fn model(placements: &[Placement]) -> Model {
         Model {
             meshes: vec![triangle()],
-            instances: placements.iter().map(|&placement| Instance { mesh: 0, placement }).collect(),
+            instances: placements
+                .iter()
+                .map(|&placement| Instance { mesh: 0, placement })
+                .collect(),
             materials: vec![Material::default()],
             textures: vec![],
         }

@@ -34,11 +34,7 @@ impl Placement {
 
     /// From an affine 4×4 matrix; its last row is taken to be `0 0 0 1`.
     pub fn from_mat4(m: DMat4) -> Self {
-        Self {
-            linear: DMat3::from_mat4(m),
-            high: m.w_axis.truncate(),
-            low: DVec3::ZERO,
-        }
+        Self { linear: DMat3::from_mat4(m), high: m.w_axis.truncate(), low: DVec3::ZERO }
     }
 
     /// The translation, rounded to `f64`.

@@ -260,10 +260,8 @@ mod tests {
         Material { alpha_mode, ..Material::default() }
     }
 
-    const WHOLE: [[Vec2; 3]; 2] = [
-        [Vec2::ZERO, Vec2::X, Vec2::ONE],
-        [Vec2::ZERO, Vec2::ONE, Vec2::Y],
-    ];
+    const WHOLE: [[Vec2; 3]; 2] =
+        [[Vec2::ZERO, Vec2::X, Vec2::ONE], [Vec2::ZERO, Vec2::ONE, Vec2::Y]];
 
     fn mean_of_square(t: &ShadedTexture, depth: u32) -> [f32; 4] {
         let [a, b] = WHOLE.map(|uv| t.integrate(uv, depth));

@@ -49,9 +49,11 @@ impl TriangleSoup {
     pub fn validate(&self) -> Result<(), InvalidSoup> {
         let n = self.positions.len();
         let fail = |m: String| Err(InvalidSoup(m));
-        for (name, len) in
-            [("normals", self.normals.len()), ("uvs", self.uvs.len()), ("colors", self.colors.len())]
-        {
+        for (name, len) in [
+            ("normals", self.normals.len()),
+            ("uvs", self.uvs.len()),
+            ("colors", self.colors.len()),
+        ] {
             if len != 0 && len != n {
                 return fail(format!("{len} {name} for {n} positions"));
             }
@@ -65,7 +67,10 @@ impl TriangleSoup {
         }
         let m = self.materials.len();
         if let Some(t) = self.triangle_materials.iter().position(|&x| x as usize >= m) {
-            return fail(format!("triangle {t} uses material {} of {m}", self.triangle_materials[t]));
+            return fail(format!(
+                "triangle {t} uses material {} of {m}",
+                self.triangle_materials[t]
+            ));
         }
         for (i, material) in self.materials.iter().enumerate() {
             if material.texture.is_some_and(|t| t as usize >= self.textures.len()) {

@@ -50,21 +50,32 @@ impl Part {
     /// When the placement is not of that form; the message quotes it.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
         // An @ that is not followed by a number belongs to the file's name.
-        let starts_number = |t: &str| t.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
-        let Some((file, placement)) = text.rsplit_once('@').filter(|(_, p)| starts_number(p)) else {
+        let starts_number =
+            |t: &str| t.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
+        let Some((file, placement)) = text.rsplit_once('@').filter(|(_, p)| starts_number(p))
+        else {
             return Ok(Self::new(text));
         };
-        let bad = |problem: String| ImportError::invalid(Path::new(file), format!("placement {placement:?}"), problem);
+        let bad = |problem: String| {
+            ImportError::invalid(Path::new(file), format!("placement {placement:?}"), problem)
+        };
         let (position, settings) = placement.split_once(':').unwrap_or((placement, ""));
-        let number = |t: &str| t.trim().parse::<f64>().map_err(|_| bad(format!("{t:?} is not a number")));
+        let number =
+            |t: &str| t.trim().parse::<f64>().map_err(|_| bad(format!("{t:?} is not a number")));
         let at: Vec<f64> = position.split(',').map(number).collect::<Result<_, _>>()?;
         let mut part = Self::new(file);
-        part.at = at.try_into().map_err(|v: Vec<f64>| bad(format!("{} coordinates; 3 are needed", v.len())))?;
+        part.at = at
+            .try_into()
+            .map_err(|v: Vec<f64>| bad(format!("{} coordinates; 3 are needed", v.len())))?;
         for setting in settings.split(',').filter(|s| !s.is_empty()) {
             match setting.split_once('=') {
                 Some(("yaw", v)) => part.yaw = number(v)?,
                 Some(("scale", v)) => part.scale = number(v)?,
-                _ => return Err(bad(format!("{setting:?}; known are yaw=DEGREES and scale=FACTOR"))),
+                _ => {
+                    return Err(bad(format!(
+                        "{setting:?}; known are yaw=DEGREES and scale=FACTOR"
+                    )));
+                }
             }
         }
         part.check()?;
@@ -77,7 +88,11 @@ impl Part {
             return Ok(());
         }
         let problem = "position and yaw must be finite, scale positive";
-        Err(ImportError::invalid(&self.file, format!("placement {}", self.placement_text()), problem))
+        Err(ImportError::invalid(
+            &self.file,
+            format!("placement {}", self.placement_text()),
+            problem,
+        ))
     }
 
     /// The placement as text, empty for none.
@@ -172,8 +187,7 @@ impl Block {
     /// # Errors
     /// As [`load`].
     pub fn load(&self, limits: &Limits) -> Result<LoadedBlock, ImportError> {
-        let mut block =
-            LoadedBlock { model: Model::default(), hashes: vec![], warnings: vec![] };
+        let mut block = LoadedBlock { model: Model::default(), hashes: vec![], warnings: vec![] };
         let mut known: HashMap<&Path, (Vec<Instance>, [u8; 32])> = HashMap::new();
         for part in &self.parts {
             if !known.contains_key(&*part.file) {
@@ -240,7 +254,8 @@ mod tests {
     fn a_file_in_two_places_is_read_once() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-        let toml = "[[tree]]\nfile = \"t.obj\"\n[[tree]]\nfile = \"t.obj\"\nat = [5, 0, 0]\nyaw = 90\n";
+        let toml =
+            "[[tree]]\nfile = \"t.obj\"\n[[tree]]\nfile = \"t.obj\"\nat = [5, 0, 0]\nyaw = 90\n";
         std::fs::write(dir.path().join("b.toml"), toml).unwrap();
         let path = dir.path().join("b.toml").to_string_lossy().into_owned();
         let block = Block::parse(&[path]).unwrap().load(&Limits::default()).unwrap();

@@ -4,9 +4,9 @@
 //! write these files: exporters leave Kd at 0.8 beside a map. Coverage is `d` (or 1 − `Tr`) times
 //! `map_d`; without `map_d`, the alpha of `map_Kd`. All faces are seen from both sides.
 
+use crate::ImportError;
 use crate::picture;
 use crate::source::Source;
-use crate::ImportError;
 use earcut::{Earcut, utils3d};
 use forest_soup::{AlphaMode, Instance, Material, Mesh, Model, Placement, Texture, Wrap};
 use glam::{Vec2, Vec3};
@@ -30,13 +30,14 @@ pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
     let failed = RefCell::new(None);
     let shared = RefCell::new(&mut *source);
     let (models, materials) =
-        tobj::load_obj_buf(&mut BufReader::new(Cursor::new(&bytes)), &options, |path| {
-            match shared.borrow_mut().file("mtllib", &path.to_string_lossy()) {
-                Ok(mtl) => tobj::load_mtl_buf(&mut BufReader::new(Cursor::new(mtl))),
-                Err(e) => {
-                    failed.borrow_mut().get_or_insert(e);
-                    Err(tobj::LoadError::OpenFileFailed)
-                }
+        tobj::load_obj_buf(&mut BufReader::new(Cursor::new(&bytes)), &options, |path| match shared
+            .borrow_mut()
+            .file("mtllib", &path.to_string_lossy())
+        {
+            Ok(mtl) => tobj::load_mtl_buf(&mut BufReader::new(Cursor::new(mtl))),
+            Err(e) => {
+                failed.borrow_mut().get_or_insert(e);
+                Err(tobj::LoadError::OpenFileFailed)
             }
         })
         .map_err(|e| ImportError::invalid(&shared.borrow().path, "obj", e))?;
@@ -95,14 +96,21 @@ fn mesh(
     if !per_vertex(normals.len()) || !per_vertex(uvs.len()) || !per_vertex(colors.len()) {
         let problem = format!(
             "{} positions, {} normals, {} texture coordinates, {} colours: some faces have them and some do not",
-            positions.len(), normals.len(), uvs.len(), colors.len()
+            positions.len(),
+            normals.len(),
+            uvs.len(),
+            colors.len()
         );
         return Err(source.invalid(&model.name, problem));
     }
     let mut triangles = Vec::with_capacity(m.indices.len() / 3);
     let mut polygons = Polygons::default();
     let mut start = 0;
-    let arities = if m.face_arities.is_empty() { vec![3; m.indices.len() / 3] } else { m.face_arities.clone() };
+    let arities = if m.face_arities.is_empty() {
+        vec![3; m.indices.len() / 3]
+    } else {
+        m.face_arities.clone()
+    };
     for arity in arities {
         let face = &m.indices[start..start + arity as usize];
         start += arity as usize;
@@ -132,7 +140,9 @@ impl Polygons {
             self.earcut.earcut(self.flat.iter().copied(), &[], &mut self.indices);
         }
         if self.indices.len() == 3 * (face.len() - 2) {
-            out.extend(self.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| face[t[k] as usize])));
+            out.extend(
+                self.indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| face[t[k] as usize])),
+            );
         } else {
             // A face without a plane, or one that crosses itself: a fan is as good as anything.
             out.extend(face[1..].windows(2).map(|w| [face[0], w[0], w[1]]));
@@ -170,7 +180,8 @@ impl MapOptions {
             let most = match name {
                 "s" | "o" | "t" => 3,
                 "mm" => 2,
-                "blendu" | "blendv" | "boost" | "bm" | "cc" | "clamp" | "imfchan" | "texres" | "type" => 1,
+                "blendu" | "blendv" | "boost" | "bm" | "cc" | "clamp" | "imfchan" | "texres"
+                | "type" => 1,
                 _ => break,
             };
             let mut words = Vec::new();
@@ -184,7 +195,8 @@ impl MapOptions {
                 words.push(word);
                 tail = after;
             }
-            let number = |k: usize, or: f32| words.get(k).and_then(|w| w.parse().ok()).unwrap_or(or);
+            let number =
+                |k: usize, or: f32| words.get(k).and_then(|w| w.parse().ok()).unwrap_or(or);
             match name {
                 "s" => options.scale = [number(0, 1.0), number(1, 1.0)],
                 "o" => options.offset = [number(0, 0.0), number(1, 0.0)],

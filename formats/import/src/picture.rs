@@ -16,10 +16,13 @@ pub(crate) fn decode(
     if bytes.starts_with(b"\xabKTX 20\xbb") {
         return Err(source.unsupported(format!("{element}: a KTX2 image (KHR_texture_basisu)")));
     }
-    let mut reader =
-        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| invalid(e.to_string()))?;
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| invalid(e.to_string()))?;
     if reader.format().is_none() {
-        return Err(source.unsupported(format!("{element}: an image that is not PNG, JPEG or WebP")));
+        return Err(
+            source.unsupported(format!("{element}: an image that is not PNG, JPEG or WebP"))
+        );
     }
     let side = source.limits.texture_side;
     let mut limits = image::Limits::default();

@@ -76,9 +76,11 @@ impl Source {
     /// The bytes of a file named relative to this one.
     pub(crate) fn file(&mut self, element: &str, name: &str) -> Result<Vec<u8>, ImportError> {
         // Names from Windows use backslashes.
-        let name: Cow<str> = if name.contains('\\') { name.replace('\\', "/").into() } else { name.into() };
+        let name: Cow<str> =
+            if name.contains('\\') { name.replace('\\', "/").into() } else { name.into() };
         let relative = Path::new(&*name);
-        let inside = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        let inside =
+            relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         if !inside && !self.limits.allow_outside {
             let problem = format!("{name:?} is outside the file's folder (see --allow-outside)");
             return Err(self.invalid(element, problem));

@@ -118,7 +118,10 @@ impl Pack {
         let (section, stored) = self.stored(id)?;
         let invalid = |problem: String| PackError::invalid(&self.path, id, problem);
         if section.length > limit {
-            return Err(invalid(format!("decodes to {} bytes; the limit is {limit}", section.length)));
+            return Err(invalid(format!(
+                "decodes to {} bytes; the limit is {limit}",
+                section.length
+            )));
         }
         match section.codec {
             Codec::None => Ok(Cow::Borrowed(stored)),
@@ -170,7 +173,8 @@ impl Pack {
             .sections
             .get(&id)
             .ok_or_else(|| PackError::invalid(&self.path, id, "the pack has no such section"))?;
-        let stored = &self.data.bytes()[section.offset as usize..][..section.stored_length as usize];
+        let stored =
+            &self.data.bytes()[section.offset as usize..][..section.stored_length as usize];
         if section_hash(stored) != section.hash {
             return Err(PackError::invalid(&self.path, id, "its hash does not match: damaged"));
         }
@@ -231,7 +235,11 @@ impl Pack {
         }
         if header.table_offset != end.next_multiple_of(ALIGNMENT) {
             let (t, want) = (header.table_offset, end.next_multiple_of(ALIGNMENT));
-            return Err(PackError::invalid(&path, "header", format!("table at {t}, not at {want}")));
+            return Err(PackError::invalid(
+                &path,
+                "header",
+                format!("table at {t}, not at {want}"),
+            ));
         }
         check_padding(&path, bytes, end, header.table_offset)?;
         Ok(Self { path, data, sections, unknown })

@@ -18,11 +18,7 @@ pub struct Spool {
 impl Spool {
     /// An empty section.
     pub fn new() -> Self {
-        Self {
-            file: SpooledTempFile::new(IN_MEMORY),
-            hasher: blake3::Hasher::new(),
-            length: 0,
-        }
+        Self { file: SpooledTempFile::new(IN_MEMORY), hasher: blake3::Hasher::new(), length: 0 }
     }
 
     /// Bytes so far.

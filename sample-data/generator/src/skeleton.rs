@@ -52,7 +52,11 @@ pub(crate) fn grow(p: &Parameters, seed: u64) -> Vec<Stem> {
                 } else {
                     let stem: &Stem = &stems[parents.start + parent];
                     let (base, along) = stem.at(t);
-                    let share = if level == 1 { p.shape.ratio((1.0 - t) / (1.0 - l.bare)) } else { 1.0 - 0.6 * t };
+                    let share = if level == 1 {
+                        p.shape.ratio((1.0 - t) / (1.0 - l.bare))
+                    } else {
+                        1.0 - 0.6 * t
+                    };
                     let length = stem.length * share * (l.length + vary(&mut rng, l.length_v));
                     let radius = stem.radius * (length / stem.length).powf(p.ratio_power);
                     let radius = radius.min(0.9 * stem.radius_at(t));

@@ -15,7 +15,12 @@ pub(crate) fn bark(p: &Parameters, seed: u64) -> Texture {
         .map(|k| {
             let across = rng.random_range(2i32..10) as f32;
             let along = rng.random_range(-3i32..4) as f32;
-            [across, along, rng.random_range(0.0..std::f32::consts::TAU), 1.0 / (1.0 + k as f32 * 0.3)]
+            [
+                across,
+                along,
+                rng.random_range(0.0..std::f32::consts::TAU),
+                1.0 / (1.0 + k as f32 * 0.3),
+            ]
         })
         .collect();
     image("bark", |uv| {
@@ -78,10 +83,15 @@ impl Leaf {
         let d = uv - self.base;
         let along = d.dot(self.direction) / self.length;
         let across = d.perp_dot(self.direction).abs() / self.length;
-        let half = 0.5 * self.width * (std::f32::consts::PI * along.clamp(0.0, 1.0)).sin().powf(0.8);
+        let half =
+            0.5 * self.width * (std::f32::consts::PI * along.clamp(0.0, 1.0)).sin().powf(0.8);
         let inside = (0.0..=1.0).contains(&along) && across < half.max(0.0);
         // A lighter midrib and side veins.
-        let vein = if across < 0.012 || ((along * 9.0 + across * 12.0).fract() < 0.12) { 1.2 } else { 1.0 };
+        let vein = if across < 0.012 || ((along * 9.0 + across * 12.0).fract() < 0.12) {
+            1.2
+        } else {
+            1.0
+        };
         inside.then_some(self.shade * vein * (0.85 + 0.3 * along))
     }
 }

@@ -157,8 +157,7 @@ impl<'a> Document<'a> {
         let max = mesh.positions.iter().copied().reduce(Vec3::max).unwrap_or_default();
         let bounds = json!({ "min": min.to_array(), "max": max.to_array() });
         let position = self.push(bytemuck::cast_slice(&mesh.positions), n, "VEC3", FLOAT, bounds);
-        let normal =
-            self.push(bytemuck::cast_slice(&mesh.normals), n, "VEC3", FLOAT, json!({}));
+        let normal = self.push(bytemuck::cast_slice(&mesh.normals), n, "VEC3", FLOAT, json!({}));
         let uv = self.push(bytemuck::cast_slice(&mesh.uvs), n, "VEC2", FLOAT, json!({}));
         let flat = mesh.triangles.as_flattened();
         let indices = if n <= usize::from(u16::MAX) {
@@ -190,7 +189,8 @@ impl<'a> Document<'a> {
 
     fn push_bytes(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
+        let view =
+            json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
         self.bytes.extend(bytes);
         self.views.push(view);
         self.views.len() - 1

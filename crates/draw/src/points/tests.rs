@@ -20,7 +20,13 @@ fn card() -> TriangleSoup {
             alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
             ..Material::default()
         }],
-        textures: vec![Arc::new(Texture { name: "checker".into(), width: 64, height: 64, texels, wrap: [Wrap::Clamp; 2] })],
+        textures: vec![Arc::new(Texture {
+            name: "checker".into(),
+            width: 64,
+            height: 64,
+            texels,
+            wrap: [Wrap::Clamp; 2],
+        })],
         ..TriangleSoup::default()
     }
 }
@@ -41,7 +47,11 @@ fn picture(pack: &Pack, forward: DVec3, largest: f64, projection: Projection) ->
     let surfaces = Surfaces::new(&materials, &textures);
     let eye = DVec3::new(0.5, 0.5, 0.0) - forward * 2.0;
     let camera = Camera::new(eye, forward, projection, [64, 64]);
-    let t = Thresholds { finest: PixelArea(0.0), largest: PixelArea(largest), depth_bias: PixelArea(0.0) };
+    let t = Thresholds {
+        finest: PixelArea(0.0),
+        largest: PixelArea(largest),
+        depth_bias: PixelArea(0.0),
+    };
     let style = Style { samples: 4, light: Light::Albedo };
     draw_points(&block, Some(&surfaces), &camera, &t, &style)
 }
@@ -64,7 +74,8 @@ fn triangles_cover_what_their_texture_shows() {
 #[test]
 fn points_cover_as_much_as_triangles_from_every_side() {
     let pack = baked(&card(), 0.01);
-    for forward in [-DVec3::Z, DVec3::new(-0.6, 0.0, -0.8), DVec3::new(0.9, 0.3, -0.3).normalize()] {
+    for forward in [-DVec3::Z, DVec3::new(-0.6, 0.0, -0.8), DVec3::new(0.9, 0.3, -0.3).normalize()]
+    {
         let (points, drawn) = picture(&pack, forward, f64::INFINITY, ORTHO);
         let (truth, _) = picture(&pack, forward, 0.0, ORTHO);
         assert!(drawn.points > 1000 && drawn.triangles == 0);
@@ -96,9 +107,13 @@ fn an_eye_inside_the_block_clips_what_is_behind_it() {
     let surfaces = Surfaces::new(&materials, &textures);
     let projection = Projection::Perspective { fov_y: 1.0 };
     let camera = Camera::new(DVec3::new(0.5, 0.5, 0.0), -DVec3::Z, projection, [32, 32]);
-    let t = Thresholds { finest: PixelArea(0.0), largest: PixelArea(0.0), depth_bias: PixelArea(0.0) };
+    let t =
+        Thresholds { finest: PixelArea(0.0), largest: PixelArea(0.0), depth_bias: PixelArea(0.0) };
     let (p, _) = draw_points(&block, Some(&surfaces), &camera, &t, &Style::default());
     // The floor below the horizon, nothing above; its far edge is 5 units away, 0.5 down.
     let rows: Vec<f32> = p.pixels.chunks(32).map(|r| r[16][3]).collect();
-    assert!(rows[..16].iter().all(|&c| c == 0.0) && rows[20..].iter().all(|&c| c == 1.0), "{rows:?}");
+    assert!(
+        rows[..16].iter().all(|&c| c == 0.0) && rows[20..].iter().all(|&c| c == 1.0),
+        "{rows:?}"
+    );
 }

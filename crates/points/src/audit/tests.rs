@@ -12,7 +12,11 @@ fn levels(radius: RadiusRule, order: Order) -> Vec<CutAudit> {
 fn exact_cuts_represent_every_surfel_once_under_every_rule() {
     for radius in [RadiusRule::Opacity, RadiusRule::Area, RadiusRule::Paper] {
         for level in levels(radius, Order::Exact) {
-            assert_eq!((level.missing, level.doubled, level.under_ancestor), (0.0, 0.0, 0), "{level:?}");
+            assert_eq!(
+                (level.missing, level.doubled, level.under_ancestor),
+                (0.0, 0.0, 0),
+                "{level:?}"
+            );
         }
     }
 }

@@ -11,13 +11,24 @@ fn quantiser() -> Quantiser {
 fn surfels(positions: &[[f32; 3]]) -> Vec<Surfel> {
     positions
         .iter()
-        .map(|&position| Surfel { position, axis: [0.0, 0.0, 1.0], area: 1e-6, rgb: [0.5; 3], opacity: 1.0 })
+        .map(|&position| Surfel {
+            position,
+            axis: [0.0, 0.0, 1.0],
+            area: 1e-6,
+            rgb: [0.5; 3],
+            opacity: 1.0,
+        })
         .collect()
 }
 
 fn tree(surfels: &[Surfel]) -> Tree {
     let leaves = Leaves::Surfels(surfels);
-    let rules = ClusterRules { leaves, radius: RadiusRule::Opacity, monotone: true, quantiser: quantiser() };
+    let rules = ClusterRules {
+        leaves,
+        radius: RadiusRule::Opacity,
+        monotone: true,
+        quantiser: quantiser(),
+    };
     let mut tree = Tree::with_parents();
     build(&rules, &mut tree);
     tree
@@ -50,7 +61,8 @@ fn check(tree: &Tree, surfels: usize) {
 #[test]
 fn equal_collinear_and_coplanar_centroids_all_give_whole_trees() {
     let n = 1000;
-    let at = |f: &dyn Fn(f32) -> [f32; 3]| (0..n).map(|i| f(i as f32 / n as f32)).collect::<Vec<_>>();
+    let at =
+        |f: &dyn Fn(f32) -> [f32; 3]| (0..n).map(|i| f(i as f32 / n as f32)).collect::<Vec<_>>();
     for positions in [
         at(&|_| [0.3, -0.2, 0.1]),
         at(&|t| [t, -t, 0.5 * t]),
@@ -84,7 +96,11 @@ fn splits_follow_the_longest_direction() {
 #[test]
 fn large_clusters_give_the_same_bytes_on_one_thread_and_on_eight() {
     let positions: Vec<[f32; 3]> = (0..100_000u32)
-        .map(|i| std::array::from_fn(|k| (i.wrapping_mul(2_654_435_761u32 >> (8 * k)) % 4096) as f32 / 4096.0))
+        .map(|i| {
+            std::array::from_fn(|k| {
+                (i.wrapping_mul(2_654_435_761u32 >> (8 * k)) % 4096) as f32 / 4096.0
+            })
+        })
         .collect();
     let s = surfels(&positions);
     let build_on = |threads| {

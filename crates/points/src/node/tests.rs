@@ -7,7 +7,8 @@ fn leaf(at: [f32; 3], axis: DVec3, area: f32) -> Node {
 }
 
 fn surfel_node(at: [f32; 3], axis: DVec3, area: f32, rule: RadiusRule) -> Node {
-    let s = Surfel { position: at, axis: axis.as_vec3().to_array(), area, rgb: [0.5; 3], opacity: 1.0 };
+    let s =
+        Surfel { position: at, axis: axis.as_vec3().to_array(), area, rgb: [0.5; 3], opacity: 1.0 };
     Node::of_surfel(&s, rule)
 }
 
@@ -56,8 +57,10 @@ fn a_leaf_behind_another_hides_a_part_that_falls_with_distance() {
 /// directions, overlap area by point sampling.
 #[test]
 fn mean_overlap_agrees_with_sampled_projections() {
-    let (a, b) = (leaf([0.0; 3], DVec3::new(0.3, 0.5, 0.81).normalize(), 0.01),
-                  leaf([0.15, 0.1, 0.2], DVec3::new(-0.6, 0.2, 0.77).normalize(), 0.01));
+    let (a, b) = (
+        leaf([0.0; 3], DVec3::new(0.3, 0.5, 0.81).normalize(), 0.01),
+        leaf([0.15, 0.1, 0.2], DVec3::new(-0.6, 0.2, 0.77).normalize(), 0.01),
+    );
     let mut rng = Pcg32::seed_from_u64(7);
     let mut unit = || loop {
         let v = DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
@@ -70,7 +73,8 @@ fn mean_overlap_agrees_with_sampled_projections() {
     for i in 0..n {
         let v = unit();
         let (u, w) = a.axis.any_orthonormal_pair();
-        let (r, t) = (a.radius * ((f64::from(i) + 0.5) / f64::from(n)).sqrt(), f64::from(i) * 2.399_963);
+        let (r, t) =
+            (a.radius * ((f64::from(i) + 0.5) / f64::from(n)).sqrt(), f64::from(i) * 2.399_963);
         let p = a.center + (u * t.cos() + w * t.sin()) * r;
         let s = (b.center - p).dot(b.axis) / v.dot(b.axis);
         if (p + v * s).distance(b.center) < b.radius {
@@ -107,7 +111,13 @@ fn isotropic_leaves_become_a_sphere_that_keeps_their_area() {
 
 #[test]
 fn colour_is_weighted_by_covered_area() {
-    let big = Surfel { position: [0.0; 3], axis: [0.0, 1.0, 0.0], area: 3e-4, rgb: [1.0, 0.0, 0.0], opacity: 1.0 };
+    let big = Surfel {
+        position: [0.0; 3],
+        axis: [0.0, 1.0, 0.0],
+        area: 3e-4,
+        rgb: [1.0, 0.0, 0.0],
+        opacity: 1.0,
+    };
     let faint = Surfel { rgb: [0.0, 1.0, 0.0], opacity: 0.5, area: 2e-4, ..big };
     let nodes = [big, faint].map(|s| Node::of_surfel(&s, RadiusRule::Opacity));
     let rgb = Node::merged(&nodes, RadiusRule::Opacity, true, None).rgb();

@@ -80,7 +80,8 @@ fn near_by_everything_is_a_triangle_and_far_away_nothing_is() {
     let soup = leaves(500, 2);
     let pack = baked(&soup, &BakeOptions::default());
     let block = PointsBlock::open(&pack).unwrap();
-    let closest = Thresholds { finest: PixelArea(0.0), largest: PixelArea(0.0), ..Default::default() };
+    let closest =
+        Thresholds { finest: PixelArea(0.0), largest: PixelArea(0.0), ..Default::default() };
     let cut = select(&block, &camera(3.0, DVec3::X), &closest);
     assert_eq!((cut.triangle_count(), cut.points(&block).count()), (500, 0));
     let cut = select(&block, &camera(1e6, DVec3::X), &Thresholds::default());
@@ -118,8 +119,18 @@ fn a_covered_cell_is_left_out_and_an_uncovered_one_is_not() {
     let options = BakeOptions { radius: RadiusRule::Area, ..BakeOptions::default() };
     let pack = baked(&soup, &options);
     let block = PointsBlock::open(&pack).unwrap();
-    let base = covered(&block, &select(&block, &camera(1.5, DVec3::Z), &Thresholds {
-        finest: PixelArea(0.0), largest: PixelArea(f64::INFINITY), depth_bias: PixelArea(0.0) }));
+    let base = covered(
+        &block,
+        &select(
+            &block,
+            &camera(1.5, DVec3::Z),
+            &Thresholds {
+                finest: PixelArea(0.0),
+                largest: PixelArea(f64::INFINITY),
+                depth_bias: PixelArea(0.0),
+            },
+        ),
+    );
     for d in [1.2, 3.0, 30.0, 90.0, 300.0, 600.0] {
         for k in [0.0, 5.0, 500.0] {
             let t = Thresholds {
@@ -136,11 +147,13 @@ fn a_covered_cell_is_left_out_and_an_uncovered_one_is_not() {
 #[test]
 fn the_papers_order_draws_a_range_of_own_sizes() {
     let soup = leaves(2000, 5);
-    let options = BakeOptions { order: Order::Paper, radius: RadiusRule::Paper, ..Default::default() };
+    let options =
+        BakeOptions { order: Order::Paper, radius: RadiusRule::Paper, ..Default::default() };
     let pack = baked(&soup, &options);
     let block = PointsBlock::open(&pack).unwrap();
     let cam = camera(4.0, DVec3::Z);
-    let t = Thresholds { finest: PixelArea(2.0), largest: PixelArea(30.0), depth_bias: PixelArea(0.0) };
+    let t =
+        Thresholds { finest: PixelArea(2.0), largest: PixelArea(30.0), depth_bias: PixelArea(0.0) };
     let cut = select(&block, &cam, &t);
     assert!(cut.points(&block).count() > 0);
     for (_, cell, p) in cut.points(&block) {

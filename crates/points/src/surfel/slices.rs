@@ -40,16 +40,18 @@ impl Slices {
     /// The slices, with `rgba` of a triangle within each.
     pub(super) fn cut(&self, rgba: impl Fn(Part) -> [f32; 4]) -> Rc<[Piece]> {
         let n = f64::from(self.count);
-        let slices: Vec<Slice> = (0..self.count)
-            .map(|i| self.slice(f64::from(i) / n, f64::from(i + 1) / n))
-            .collect();
+        let slices: Vec<Slice> =
+            (0..self.count).map(|i| self.slice(f64::from(i) / n, f64::from(i + 1) / n)).collect();
         let largest = slices.iter().map(|s| s.area).fold(0.0, f64::max);
         slices
             .iter()
             .map(|s| Piece {
                 at: self.weights(s.along, s.up).to_array(),
                 area: (s.area / largest) as f32,
-                rgba: rgba([(s.from, 0.0), (s.to, 0.0), (s.along, 2.0 * s.up)].map(|(t, h)| self.weights(t, h))),
+                rgba: rgba(
+                    [(s.from, 0.0), (s.to, 0.0), (s.along, 2.0 * s.up)]
+                        .map(|(t, h)| self.weights(t, h)),
+                ),
             })
             .collect()
     }

@@ -72,18 +72,27 @@ impl Reader<'_> {
         }
         let mut out = Vec::new();
         // Every u32 is exact in an f64.
-        self.read(element, index, &[Type::Scalar], |mut v| out.push(v.next().unwrap_or(0.0) as u32))?;
+        self.read(element, index, &[Type::Scalar], |mut v| {
+            out.push(v.next().unwrap_or(0.0) as u32)
+        })?;
         Ok(out)
     }
 
-    pub(crate) fn count(&self, element: &str, index: Index<Accessor>) -> Result<usize, ImportError> {
+    pub(crate) fn count(
+        &self,
+        element: &str,
+        index: Index<Accessor>,
+    ) -> Result<usize, ImportError> {
         Ok(self.accessor(element, index)?.count.0 as usize)
     }
 
     fn accessor(&self, element: &str, index: Index<Accessor>) -> Result<&Accessor, ImportError> {
         let count = self.root.accessors.len();
         let at = index.value();
-        self.root.accessors.get(at).ok_or_else(|| missing(self.source, element, "accessor", at, count))
+        self.root
+            .accessors
+            .get(at)
+            .ok_or_else(|| missing(self.source, element, "accessor", at, count))
     }
 
     fn read(
@@ -139,8 +148,10 @@ impl Reader<'_> {
         &'b self,
         element: &'b str,
         index: Index<Accessor>,
-    ) -> Result<Option<(Vec<u32>, Box<dyn Fn(usize) -> Result<Vec<f64>, ImportError> + 'b>)>, ImportError>
-    {
+    ) -> Result<
+        Option<(Vec<u32>, Box<dyn Fn(usize) -> Result<Vec<f64>, ImportError> + 'b>)>,
+        ImportError,
+    > {
         let accessor = self.accessor(element, index)?;
         let (Some(sparse), Checked::Valid(component), Checked::Valid(kind)) =
             (&accessor.sparse, accessor.component_type.as_ref(), accessor.type_.as_ref())
@@ -151,17 +162,22 @@ impl Reader<'_> {
             return Err(self.source.invalid(element, "unknown sparse index type"));
         };
         let count = sparse.count.0 as usize;
-        let layout = |component: ComponentType, components: usize, offset: u64, normalized| Layout {
-            component,
-            components,
-            stride: component.size() * components,
-            offset: offset as usize,
-            count,
-            normalized,
-        };
+        let layout =
+            |component: ComponentType, components: usize, offset: u64, normalized| Layout {
+                component,
+                components,
+                stride: component.size() * components,
+                offset: offset as usize,
+                count,
+                normalized,
+            };
         let at = layout(index_type.0, 1, sparse.indices.byte_offset.0, false);
-        let to =
-            layout(component.0, kind.multiplicity(), sparse.values.byte_offset.0, accessor.normalized);
+        let to = layout(
+            component.0,
+            kind.multiplicity(),
+            sparse.values.byte_offset.0,
+            accessor.normalized,
+        );
         let view = |i: usize| self.buffers.view(self.source, self.root, i);
         let index_view = view(sparse.indices.buffer_view.value())?;
         let value_view = view(sparse.values.buffer_view.value())?;
@@ -189,7 +205,10 @@ impl Layout {
         }
         if self.count > 0 && end.is_none_or(|e| e > bytes.len()) {
             let (n, s, o) = (self.count, self.stride, self.offset);
-            return Err(format!("{n} elements at stride {s} from offset {o} in {} bytes", bytes.len()));
+            return Err(format!(
+                "{n} elements at stride {s} from offset {o} in {} bytes",
+                bytes.len()
+            ));
         }
         Ok(())
     }

@@ -60,7 +60,13 @@ impl Buffers {
             .get(index)
             .ok_or_else(|| missing(source, "file", "bufferView", index, root.buffer_views.len()))?;
         if let Some(packed) = Packed::of(source, &element, view)? {
-            let bytes = self.slice(source, &element, packed.buffer, packed.byte_offset, packed.byte_length)?;
+            let bytes = self.slice(
+                source,
+                &element,
+                packed.buffer,
+                packed.byte_offset,
+                packed.byte_length,
+            )?;
             let bytes = packed.decode(source, &element, bytes)?;
             return Ok(ViewBytes { bytes: bytes.into(), stride: Some(packed.byte_stride) });
         }
@@ -80,18 +86,17 @@ impl Buffers {
         length: usize,
     ) -> Result<&[u8], ImportError> {
         let count = self.data.len();
-        let data =
-            self.data.get(buffer).ok_or_else(|| missing(source, element, "buffer", buffer, count))?;
+        let data = self
+            .data
+            .get(buffer)
+            .ok_or_else(|| missing(source, element, "buffer", buffer, count))?;
         let Some(data) = data else {
             return Err(source.invalid(element, format!("buffer {buffer} has no data")));
         };
-        offset
-            .checked_add(length)
-            .and_then(|end| data.get(offset..end))
-            .ok_or_else(|| {
-                let problem = format!("bytes {offset}+{length} of buffer {buffer} with {}", data.len());
-                source.invalid(element, problem)
-            })
+        offset.checked_add(length).and_then(|end| data.get(offset..end)).ok_or_else(|| {
+            let problem = format!("bytes {offset}+{length} of buffer {buffer} with {}", data.len());
+            source.invalid(element, problem)
+        })
     }
 }
 
@@ -138,9 +143,9 @@ impl Packed {
             let (mode, count) = (&self.mode, self.count);
             return Err(bad(format!("byteStride {stride} and count {count} in mode {mode}")));
         }
-        let mut out = self
-            .unpack(data)
-            .ok_or_else(|| bad(format!("{} bytes do not decode in mode {}", data.len(), self.mode)))?;
+        let mut out = self.unpack(data).ok_or_else(|| {
+            bad(format!("{} bytes do not decode in mode {}", data.len(), self.mode))
+        })?;
         let bytes: &mut [u8] = &mut out;
         match (self.filter.as_deref(), stride) {
             (None | Some("NONE"), _) => {}
@@ -165,8 +170,12 @@ impl Packed {
         #[expect(unsafe_code, reason = "the safe wrappers want the stride at compile time")]
         let code = unsafe {
             match self.mode.as_str() {
-                "ATTRIBUTES" => meshopt::ffi::meshopt_decodeVertexBuffer(to, count, stride, from, length),
-                "TRIANGLES" => meshopt::ffi::meshopt_decodeIndexBuffer(to, count, stride, from, length),
+                "ATTRIBUTES" => {
+                    meshopt::ffi::meshopt_decodeVertexBuffer(to, count, stride, from, length)
+                }
+                "TRIANGLES" => {
+                    meshopt::ffi::meshopt_decodeIndexBuffer(to, count, stride, from, length)
+                }
                 _ => meshopt::ffi::meshopt_decodeIndexSequence(to, count, stride, from, length),
             }
         };

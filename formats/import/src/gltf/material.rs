@@ -48,7 +48,8 @@ pub(crate) fn textures(
             .get(index)
             .ok_or_else(|| missing(source, &format!("material {i}"), "texture", index, count))?;
         let others = texture.extensions.as_ref().map(|e| &e.others);
-        let webp = others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e["source"].as_u64());
+        let webp =
+            others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e["source"].as_u64());
         let image = match webp.map(|i| i as usize).unwrap_or(texture.source.value()) {
             // The crate's mark for "no source".
             i if i == u32::MAX as usize => {
@@ -203,7 +204,9 @@ pub(crate) fn material(
         texture: base.texture.as_ref().map(|t| textures[&t.index]),
         alpha_mode,
         double_sided: m.double_sided,
-        unlit: extensions.is_some_and(|e| e.unlit.is_some() || e.others.get("KHR_materials_unlit").is_some_and(Value::is_object)),
+        unlit: extensions.is_some_and(|e| {
+            e.unlit.is_some() || e.others.get("KHR_materials_unlit").is_some_and(Value::is_object)
+        }),
     };
     Ok((material, base.texture.map(|t| t.look)))
 }

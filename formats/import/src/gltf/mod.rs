@@ -47,8 +47,8 @@ const SUPPORTED: &[&str] = &[
 pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
     let bytes = std::mem::take(&mut source.bytes);
     let (json, blob) = split(source, &bytes)?;
-    let root: Root = gltf::json::deserialize::from_slice(json)
-        .map_err(|e| source.invalid("JSON", e))?;
+    let root: Root =
+        gltf::json::deserialize::from_slice(json).map_err(|e| source.invalid("JSON", e))?;
     if let Some(extension) =
         root.extensions_required.iter().find(|e| !SUPPORTED.contains(&e.as_str()))
     {
@@ -104,10 +104,7 @@ pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
 }
 
 /// The JSON and, of a binary container, the blob.
-fn split<'a>(
-    source: &Source,
-    bytes: &'a [u8],
-) -> Result<(&'a [u8], Option<Vec<u8>>), ImportError> {
+fn split<'a>(source: &Source, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Vec<u8>>), ImportError> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
     }

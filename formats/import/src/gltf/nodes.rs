@@ -58,7 +58,8 @@ pub(crate) fn instances(
     let document: Document =
         serde_json::from_slice(json).map_err(|e| source.invalid("nodes", e))?;
     let mut skinned = 0;
-    let mut walk = Walk { source, root, buffers, of_mesh, document, out: Vec::new(), skinned: &mut skinned };
+    let mut walk =
+        Walk { source, root, buffers, of_mesh, document, out: Vec::new(), skinned: &mut skinned };
     for node in walk.roots()? {
         walk.visit(node, Placement::IDENTITY, 0)?;
     }
@@ -154,8 +155,8 @@ impl Walk<'_> {
             attributes: BTreeMap<String, u32>,
         }
         let element = format!("{element} EXT_mesh_gpu_instancing");
-        let extension: Extension = serde_json::from_value(value.clone())
-            .map_err(|e| self.source.invalid(&element, e))?;
+        let extension: Extension =
+            serde_json::from_value(value.clone()).map_err(|e| self.source.invalid(&element, e))?;
         let reader = Reader { source: self.source, root: self.root, buffers: self.buffers };
         let accessor =
             |name: &str| extension.attributes.get(name).map(|&i| Index::<Accessor>::new(i));

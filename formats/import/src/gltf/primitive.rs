@@ -43,7 +43,11 @@ pub(crate) fn mesh(
     mesh.positions = positions.iter().map(|p| DVec3::from_array(*p).as_vec3()).collect();
     let count = mesh.positions.len();
     let same_length = |name: &str, n: usize| {
-        if n == count { Ok(()) } else { Err(source.invalid(element, format!("{n} {name} for {count} positions"))) }
+        if n == count {
+            Ok(())
+        } else {
+            Err(source.invalid(element, format!("{n} {name} for {count} positions")))
+        }
     };
     if let Some(accessor) = attribute(Semantic::Normals) {
         let normals = reader.numbers(element, accessor, &[Type::Vec3], [0.0; 3])?;
@@ -111,7 +115,7 @@ fn triangles(
         Mode::TriangleFan => {
             order.get(1..).unwrap_or(&[]).windows(2).map(|w| [w[0], w[1], order[0]]).collect()
         }
-        _ if order.len() % 3 != 0 => {
+        _ if !order.len().is_multiple_of(3) => {
             return Err(invalid(format!("{} indices are not whole triangles", order.len())));
         }
         _ => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),

@@ -49,20 +49,29 @@ impl Doc {
 
     fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
+        let view =
+            json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
         self.bytes.extend(bytes);
         self.push("bufferViews", view)
     }
 
     fn accessor(&mut self, bytes: &[u8], component: u32, count: usize, kind: &str) -> usize {
         let view = self.view(bytes);
-        self.push("accessors", json!({
-            "bufferView": view, "componentType": component, "count": count, "type": kind,
-        }))
+        self.push(
+            "accessors",
+            json!({
+                "bufferView": view, "componentType": component, "count": count, "type": kind,
+            }),
+        )
     }
 
     fn floats(&mut self, values: &[f32], kind: &str) -> usize {
-        let width = match kind { "SCALAR" => 1, "VEC2" => 2, "VEC3" => 3, _ => 4 };
+        let width = match kind {
+            "SCALAR" => 1,
+            "VEC2" => 2,
+            "VEC3" => 3,
+            _ => 4,
+        };
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         self.accessor(&bytes, 5126, values.len() / width, kind)
     }
@@ -70,7 +79,8 @@ impl Doc {
     fn load(mut self) -> Result<Model, ImportError> {
         let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
         self.json["buffers"][0]["byteLength"] = json!(self.bytes.len());
-        self.json["buffers"][0]["uri"] = json!(format!("data:application/octet-stream;base64,{data}"));
+        self.json["buffers"][0]["uri"] =
+            json!(format!("data:application/octet-stream;base64,{data}"));
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("t.gltf");
         std::fs::write(&path, self.json.to_string()).unwrap();
@@ -205,13 +215,15 @@ fn png_jpeg_and_webp_images() {
         let mut doc = Doc::triangle();
         textured(&mut doc, &encoded(format), mime);
         if format == WebP {
-            doc.json["textures"] = json!([{ "extensions": { "EXT_texture_webp": { "source": 0 } } }]);
+            doc.json["textures"] =
+                json!([{ "extensions": { "EXT_texture_webp": { "source": 0 } } }]);
             doc.json["extensionsRequired"] = json!(["EXT_texture_webp"]);
         }
         let model = doc.load().unwrap();
         let t = &model.textures[0];
         assert_eq!((t.width, t.height), (8, 4));
-        let off = t.texels[9].iter().zip([200, 100, 50, 255]).map(|(&a, b)| i32::from(a).abs_diff(b));
+        let off =
+            t.texels[9].iter().zip([200, 100, 50, 255]).map(|(&a, b)| i32::from(a).abs_diff(b));
         assert!(off.max().unwrap() <= 3, "{format:?} {:?}", t.texels[9]);
     }
 }
@@ -219,7 +231,11 @@ fn png_jpeg_and_webp_images() {
 #[test]
 fn sixteen_bit_png_is_rounded_to_eight() {
     let mut out = std::io::Cursor::new(Vec::new());
-    let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_pixel(2, 2, image::Rgba([65535, 257 * 77, 0, 32896]));
+    let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_pixel(
+        2,
+        2,
+        image::Rgba([65535, 257 * 77, 0, 32896]),
+    );
     image.write_to(&mut out, image::ImageFormat::Png).unwrap();
     let mut doc = Doc::triangle();
     textured(&mut doc, &out.into_inner(), "image/png");
@@ -262,7 +278,11 @@ fn gpu_instances_stay_one_mesh() {
     assert_eq!((model.meshes.len(), model.instances.len(), model.triangle_count()), (1, 2, 2));
     let soup = model.flatten(10).unwrap();
     assert_eq!(soup.origin.to_array(), [1.0, 0.0, 10.0]);
-    assert!((soup.positions[4] - Vec3::new(-1.0, 3.0, 0.0)).length() < 1e-6, "{}", soup.positions[4]);
+    assert!(
+        (soup.positions[4] - Vec3::new(-1.0, 3.0, 0.0)).length() < 1e-6,
+        "{}",
+        soup.positions[4]
+    );
 }
 
 #[test]
@@ -275,7 +295,9 @@ fn meshopt_compressed_views() {
         meshopt::encode_index_buffer(&order, 60).unwrap(),
     ];
     let mut views = vec![];
-    for (bytes, (mode, stride, count)) in packed.iter().zip([("ATTRIBUTES", 12, 60), ("TRIANGLES", 4, order.len())]) {
+    for (bytes, (mode, stride, count)) in
+        packed.iter().zip([("ATTRIBUTES", 12, 60), ("TRIANGLES", 4, order.len())])
+    {
         let view = doc.view(bytes);
         let inner = doc.json["bufferViews"][view].clone();
         doc.json["bufferViews"][view]["extensions"] = json!({ "EXT_meshopt_compression": {
@@ -284,14 +306,21 @@ fn meshopt_compressed_views() {
         }});
         views.push(view);
     }
-    let p = doc.push("accessors", json!({ "bufferView": views[0], "componentType": 5126, "count": 60, "type": "VEC3" }));
+    let p = doc.push(
+        "accessors",
+        json!({ "bufferView": views[0], "componentType": 5126, "count": 60, "type": "VEC3" }),
+    );
     let i = doc.push("accessors", json!({ "bufferView": views[1], "componentType": 5125, "count": order.len(), "type": "SCALAR" }));
     *doc.primitive() = json!({ "attributes": { "POSITION": p }, "indices": i });
     doc.json["extensionsRequired"] = json!(["EXT_meshopt_compression"]);
     let mesh = &doc.load().unwrap().meshes[0];
     assert_eq!(mesh.positions[59].to_array(), vertices[59]);
     // The codec may turn a triangle, not change it.
-    let sorted = |t: &[u32]| { let mut t = t.to_vec(); t.sort_unstable(); t };
+    let sorted = |t: &[u32]| {
+        let mut t = t.to_vec();
+        t.sort_unstable();
+        t
+    };
     for (got, want) in mesh.triangles.iter().zip(order.chunks(3)) {
         assert_eq!(sorted(got), sorted(want));
     }

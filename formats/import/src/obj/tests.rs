@@ -29,10 +29,14 @@ fn quads_concave_polygons_and_negative_indices() {
     let dir = tempfile::tempdir().unwrap();
     // A unit square, an L of area 3 (a fan from its first corner would fold over), a triangle
     // counted from the end.
-    write(dir.path(), "t.obj", "\
+    write(
+        dir.path(),
+        "t.obj",
+        "\
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n\
 v 1 1 5\nv 1 2 5\nv 0 2 5\nv 0 0 5\nv 2 0 5\nv 2 1 5\nf 5 6 7 8 9 10\n\
-v 0 0 9\nv 1 0 9\nv 0 1 9\nf -3 -2 -1\n");
+v 0 0 9\nv 1 0 9\nv 0 1 9\nf -3 -2 -1\n",
+    );
     let model = import(dir.path());
     assert_eq!(model.triangle_count(), 2 + 4 + 1);
     assert!((area(&model) - (1.0 + 3.0 + 0.5)).abs() < 1e-5, "{}", area(&model));
@@ -42,7 +46,11 @@ v 0 0 9\nv 1 0 9\nv 0 1 9\nf -3 -2 -1\n");
 fn loose_edges_are_left_out() {
     // Blender writes the edges of no face as lines; they have no texture coordinates.
     let dir = tempfile::tempdir().unwrap();
-    write(dir.path(), "t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nvt 0 0\nl 1 4\np 2\nf 1/1 2/1 3/1\n");
+    write(
+        dir.path(),
+        "t.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nvt 0 0\nl 1 4\np 2\nf 1/1 2/1 3/1\n",
+    );
     let model = import(dir.path());
     assert_eq!((model.triangle_count(), model.meshes[0].uvs.len()), (1, 3));
 }
@@ -52,11 +60,15 @@ fn alpha_comes_from_map_d_from_map_kd_or_from_tr() {
     let dir = tempfile::tempdir().unwrap();
     png(dir.path(), "leaf one.png", 2, |x, _| [10, 200, 30, if x == 0 { 0 } else { 255 }]);
     png(dir.path(), "mask.png", 4, |x, _| if x < 2 { [0, 0, 0, 255] } else { [255; 4] });
-    write(dir.path(), "t.mtl", "\
+    write(
+        dir.path(),
+        "t.mtl",
+        "\
 newmtl own\nKd 0.1 0.1 0.1\nmap_Kd leaf one.png\n\
 newmtl masked\nmap_Kd leaf one.png\nmap_d -clamp on mask.png\n\
 newmtl glass\nKd 0.5 0.25 0.125\nTr 0.75\n\
-newmtl solid\nKd 1 0 0\nd 1.0\n");
+newmtl solid\nKd 1 0 0\nd 1.0\n",
+    );
     let mut obj = String::from("mtllib t.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n");
     for m in ["own", "masked", "glass", "solid"] {
         obj.push_str(&format!("usemtl {m}\nf 1/1 2/2 3/3\n"));
@@ -82,7 +94,10 @@ newmtl solid\nKd 1 0 0\nd 1.0\n");
 fn map_options_are_not_part_of_the_name() {
     let parse = MapOptions::parse;
     let (o, name) = parse("-s 2 3 1 -o 0.5 0.25 -bm 0.2 -clamp on leaf card.png");
-    assert_eq!((o.scale, o.offset, o.wrap, name), ([2.0, 3.0], [0.5, 0.25], Wrap::Clamp, "leaf card.png"));
+    assert_eq!(
+        (o.scale, o.offset, o.wrap, name),
+        ([2.0, 3.0], [0.5, 0.25], Wrap::Clamp, "leaf card.png")
+    );
     assert_eq!(parse("plain.png").1, "plain.png");
     assert_eq!(parse("-s 2").1, "2"); // nonsense names the odd word, and reading it fails by name
 }

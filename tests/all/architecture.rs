@@ -1,0 +1,118 @@
+//! The arrows between crates, read from `cargo metadata`.
+
+use crate::support::repo;
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
+
+fn metadata() -> serde_json::Value {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    let output = Command::new(cargo)
+        .args(["metadata", "--format-version", "1", "--locked"])
+        .current_dir(repo("."))
+        .output()
+        .expect("cargo runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("JSON")
+}
+
+/// What each crate of this workspace may use of it. Tests may use more.
+const ALLOWED: &[(&str, &[&str])] = &[
+    ("forest-soup", &[]),
+    ("forest-pack", &[]),
+    ("forest-import", &["forest-soup"]),
+    ("forest-points", &["forest-soup", "forest-pack"]),
+    ("forest-draw", &["forest-soup", "forest-points"]),
+    ("forest-sample-data", &["forest-soup"]),
+    (
+        "forest-bake",
+        &["forest-soup", "forest-pack", "forest-import", "forest-points", "forest-draw"],
+    ),
+    ("forest-tests", &["forest-soup", "forest-pack", "forest-points", "forest-draw"]),
+];
+
+#[test]
+fn arrows_point_one_way() {
+    let metadata = metadata();
+    let allowed: BTreeMap<&str, BTreeSet<&str>> =
+        ALLOWED.iter().map(|(k, v)| (*k, v.iter().copied().collect())).collect();
+    let mut seen = 0;
+    for package in metadata["packages"].as_array().unwrap() {
+        let name = package["name"].as_str().unwrap();
+        if !package["source"].is_null() {
+            continue;
+        }
+        seen += 1;
+        let may = allowed.get(name).unwrap_or_else(|| panic!("{name}: say here what it may use"));
+        for dependency in package["dependencies"].as_array().unwrap() {
+            let used = dependency["name"].as_str().unwrap();
+            if used.starts_with("forest-") && dependency["kind"].is_null() {
+                assert!(may.contains(used), "{name} must not use {used}");
+            }
+        }
+    }
+    assert_eq!(seen, ALLOWED.len());
+}
+
+#[test]
+fn only_one_module_knows_bincode() {
+    let mut users = vec![];
+    for package in metadata()["packages"].as_array().unwrap() {
+        let dependencies = package["dependencies"].as_array().unwrap();
+        if package["source"].is_null() && dependencies.iter().any(|d| d["name"] == "bincode") {
+            users.push(package["name"].as_str().unwrap().to_string());
+        }
+    }
+    assert_eq!(users, ["forest-pack"]);
+    let source = repo("formats/pack/src");
+    for entry in std::fs::read_dir(source).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "rs") && path.file_name().unwrap() != "header.rs" {
+            let text = std::fs::read_to_string(&path).unwrap();
+            assert!(!text.contains("bincode::"), "{}", path.display());
+        }
+    }
+}
+
+/// Licences that a program under MIT OR Apache-2.0 can carry.
+const LICENCES: &[&str] = &[
+    "MIT",
+    "Apache-2.0",
+    "Apache-2.0 WITH LLVM-exception",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "ISC",
+    "Zlib",
+    "0BSD",
+    "Unlicense",
+    "CC0-1.0",
+    "Unicode-3.0",
+    "BSL-1.0",
+    "MIT-0",
+];
+
+#[test]
+fn every_dependency_has_a_licence_we_can_ship() {
+    for package in metadata()["packages"].as_array().unwrap() {
+        let name = package["name"].as_str().unwrap();
+        let Some(licence) = package["license"].as_str() else { panic!("{name} has no licence") };
+        // One choice of every OR whose ANDs are all known.
+        let fits = licence
+            .replace('/', " OR ")
+            .replace(['(', ')'], "")
+            .split(" OR ")
+            .any(|choice| choice.split(" AND ").all(|l| LICENCES.contains(&l.trim())));
+        assert!(fits, "{name}: {licence}");
+    }
+}
+
+#[test]
+fn there_is_one_glam() {
+    let metadata = metadata();
+    let packages = metadata["resolve"]["nodes"].as_array().unwrap();
+    let glams: BTreeSet<&str> = packages
+        .iter()
+        .filter_map(|n| n["id"].as_str())
+        .filter(|id| id.contains("#glam@"))
+        .collect();
+    assert_eq!(glams.len(), 1, "{glams:?}");
+}

@@ -1,0 +1,11 @@
+//! One test binary; a line a module says what belongs there.
+
+mod architecture; // the arrows between crates, licences, one version of what must be one
+mod blocks; // several trees baked together
+mod cli; // the program: usage, exit codes, what it prints, what it leaves behind
+mod fuzz_corpus; // inputs that fuzzing found or started from
+mod goldens; // committed packs: read, damaged, baked again
+mod hard_cases; // degenerate and extreme soups, each with its expected number
+mod invariance; // threads, places and scales that must not matter
+mod real_trees; // trees by others, where they are present
+mod support; // temporary folders, running the program

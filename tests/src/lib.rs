@@ -1,0 +1,83 @@
+//! What tests, the golden packs and the fuzz targets share.
+
+pub mod golden;
+pub mod soups;
+
+use forest_pack::header::{self, Meta};
+use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
+use forest_points::{
+    BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, read_materials,
+    select,
+};
+use forest_soup::{Camera, Projection, TriangleSoup};
+use glam::DVec3;
+use std::path::Path;
+
+/// Bakes into memory; the pack has a fixed `meta` section.
+///
+/// # Errors
+/// As [`bake`].
+pub fn bake_bytes(
+    soup: &TriangleSoup,
+    options: &BakeOptions,
+) -> Result<(Vec<u8>, BakeReport), BakeError> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    let meta = Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] };
+    writer.add(SectionId::new(kind::META, 0), Codec::None, &header::encode(&meta))?;
+    let report = bake(soup, options, &mut writer, &|_| {})?;
+    writer.finish()?;
+    Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+}
+
+/// Opens a pack in memory.
+///
+/// # Errors
+/// As [`Pack::open`].
+pub fn open(bytes: &[u8]) -> Result<Pack, PackError> {
+    Pack::from_bytes(Path::new("test.fpack"), bytes)
+}
+
+/// Everything that a viewer would do with an untrusted pack: open, verify, validate, read materials,
+/// select from afar and from inside. Any bytes must end in a value or an error.
+///
+/// # Errors
+/// When the pack breaks a rule.
+pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
+    let pack = open(bytes)?;
+    pack.verify()?;
+    header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
+    let block = PointsBlock::open(&pack)?;
+    if !block.triangles.is_empty() {
+        read_materials(&pack)?;
+    }
+    let projection = Projection::Perspective { fov_y: 1.0 };
+    let mut drawn = 0;
+    for distance in [0.0, 1.0, 1e4] {
+        let eye = block.origin() + DVec3::Z * (distance * block.scale());
+        let camera = Camera::new(eye, -DVec3::Z, projection, [640, 480]);
+        let thresholds = Thresholds { depth_bias: PixelArea(3.0), ..Thresholds::default() };
+        let cut = select(&block, &camera, &thresholds);
+        drawn += cut.points(&block).count() + cut.triangle_count() as usize;
+    }
+    Ok(drawn)
+}
+
+/// A golden pack whose section number `which` (of the points representation) is `data` instead:
+/// with sound hashes, so that what is tested is the rules, not the hash. `None` for a number that
+/// does not exist.
+pub fn with_section(golden: &[u8], which: u8, data: &[u8]) -> Option<Vec<u8>> {
+    let pack = open(golden).ok()?;
+    let ids: Vec<(SectionId, Codec)> = pack.sections().map(|(id, s)| (id, s.codec)).collect();
+    let &(replaced, codec) = ids.get(usize::from(which))?;
+    let dir = tempfile::tempdir().ok()?;
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path).ok()?;
+    for &(id, _) in ids.iter().filter(|(id, _)| *id != replaced) {
+        writer.copy(&pack, id).ok()?;
+    }
+    writer.add(replaced, codec, data).ok()?;
+    writer.finish().ok()?;
+    std::fs::read(&path).ok()
+}
