@@ -112,7 +112,7 @@ fn needles_of_aspect_a_million_keep_area_and_line() {
             [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1e-6, z)]
         })
         .collect();
-    let fine = BakeOptions { surfel_size: SurfelSize::Units(0.05), ..BakeOptions::default() };
+    let fine = BakeOptions { surfel_size: SurfelSize::Units(0.0501), ..BakeOptions::default() };
     let (bytes, report) = bake_bytes(&of_triangles(&needles), &fine).unwrap();
     assert_eq!(report.header.counts.surfels, 20 * 20);
     assert!((surfel_area(&bytes) / (20.0 * 0.25e-6) - 1.0).abs() < 0.01, "{}", surfel_area(&bytes));

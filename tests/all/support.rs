@@ -2,18 +2,24 @@
 
 use assert_cmd::Command;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
-/// `forest-bake` of this build.
+/// `forest-bake` of this build, built if need be: a stale program would be tested otherwise.
 pub(crate) fn forest_bake() -> Command {
-    let exe = std::env::current_exe().expect("the path of this test");
-    // target/<profile>/deps/all-… → target/<profile>/forest-bake
-    let program = exe.ancestors().nth(2).expect("a target folder").join("forest-bake");
-    assert!(
-        program.exists(),
-        "{} is missing: run `make test`, or `cargo build -p forest-bake` first",
-        program.display()
-    );
-    Command::new(program)
+    static PROGRAM: LazyLock<PathBuf> = LazyLock::new(|| {
+        let exe = std::env::current_exe().expect("the path of this test");
+        // target/<profile>/deps/all-…
+        let folder = exe.ancestors().nth(2).expect("a target folder");
+        let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+        let mut build = std::process::Command::new(cargo);
+        build.args(["build", "--quiet", "--workspace", "--bins"]).current_dir(repo("."));
+        if folder.ends_with("release") {
+            build.arg("--release");
+        }
+        assert!(build.status().expect("cargo runs").success(), "forest-bake does not build");
+        folder.join("forest-bake")
+    });
+    Command::new(&*PROGRAM)
 }
 
 /// Runs it and returns (exit code, stdout, stderr).

@@ -76,10 +76,10 @@ pub(crate) struct PointsOptions {
     grid: String,
     /// Largest extent of the finest points in world units; "auto" is 1/256 of the height;
     /// "triangle" makes one point of each triangle.
-    #[arg(long, default_value = "auto", value_name = "LENGTH")]
+    #[arg(long, default_value = "auto", value_name = "LENGTH", allow_hyphen_values = true)]
     surfel_size: String,
     /// Cut textured cards until this share of their alpha footprint at most is wrong.
-    #[arg(long, default_value_t = 0.1, value_name = "SHARE")]
+    #[arg(long, default_value_t = 0.1, value_name = "SHARE", allow_hyphen_values = true)]
     alpha_tolerance: f64,
 }
 

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use forest_draw::{Light, Style, draw_points};
-//! use forest_points::{BakeOptions, PointsBlock, Thresholds, bake};
+//! use forest_points::{BakeOptions, PointsBlock, SurfelSize, Thresholds, bake};
 //! use forest_soup::{Camera, Material, Projection, TriangleSoup};
 //! use glam::{DVec3, Vec3};
 //!
@@ -21,7 +21,8 @@
 //! };
 //! let path = tempfile::tempdir().unwrap().keep().join("leaf.fpack");
 //! let mut writer = forest_pack::PackWriter::create(&path).unwrap();
-//! bake(&leaf, &BakeOptions::default(), &mut writer, &|_| {}).unwrap();
+//! let options = BakeOptions { surfel_size: SurfelSize::Triangle, ..BakeOptions::default() };
+//! bake(&leaf, &options, &mut writer, &|_| {}).unwrap();
 //! writer.finish().unwrap();
 //!
 //! let pack = forest_pack::Pack::open(&path).unwrap();
@@ -29,7 +30,7 @@
 //! let projection = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::new(DVec3::new(0.5, 0.5, 1.0), -DVec3::Z, projection, [64, 64]);
 //! let style = Style { samples: 4, light: Light::Albedo };
-//! // Points only: the leaf's half unit of area covers about an eighth of the picture.
+//! // One disc of the leaf's area, half a unit, in a picture of four.
 //! let (picture, _) = draw_points(&block, None, &camera, &Thresholds::default(), &style);
 //! assert!((picture.mean_coverage() - 0.125).abs() < 0.01);
 //! ```

@@ -21,7 +21,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// Source triangles whose cells are baked before they are written: bounds the memory of a bake.
-const BATCH: usize = 1 << 20;
+const BATCH: usize = 1 << 22;
 
 /// Why a soup could not be baked.
 #[derive(Debug, thiserror::Error)]

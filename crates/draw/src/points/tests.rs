@@ -78,7 +78,7 @@ fn points_cover_as_much_as_triangles_from_every_side() {
     {
         let (points, drawn) = picture(&pack, forward, f64::INFINITY, ORTHO);
         let (truth, _) = picture(&pack, forward, 0.0, ORTHO);
-        assert!(drawn.points > 1000 && drawn.triangles == 0);
+        assert!(drawn.points > 100 && drawn.triangles == 0);
         // Discs of the triangles' area lie over each other and leave gaps: less than the sum.
         let ratio = points.mean_coverage() / truth.mean_coverage();
         assert!((0.7..1.01).contains(&ratio), "{ratio}");
