@@ -40,7 +40,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
     /// Samples a side of a pixel.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=16))]
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=16))]
     samples: u32,
     /// Straight alpha instead of a grey background.
     #[arg(long)]
@@ -116,9 +116,13 @@ impl Args {
         let [min, max] = [block.header.min, block.header.max].map(DVec3::from_array);
         let center = block.to_world((min + max) * 0.5);
         let size = [self.size; 2];
+        let corners: [DVec3; 8] = std::array::from_fn(|i| {
+            let pick = |k: usize| if i >> k & 1 == 0 { min[k] } else { max[k] };
+            block.to_world(DVec3::new(pick(0), pick(1), pick(2)))
+        });
         Ok(match self.distance {
             None => {
-                let height = 2.0 * radius;
+                let height = 1.04 * extent(&corners, from).max(1e-9 * radius);
                 let eye = center + from * (2.0 * radius);
                 Camera::new(eye, -from, Projection::Orthographic { height }, size)
             }
@@ -130,6 +134,17 @@ impl Args {
             Some(d) => return Err(Usage(format!("--distance {d}: must be positive")).into()),
         })
     }
+}
+
+/// The larger side of the picture of a box, seen from direction `from`.
+fn extent(corners: &[DVec3; 8], from: DVec3) -> f64 {
+    let camera = Camera::new(DVec3::ZERO, -from, Projection::Orthographic { height: 1.0 }, [1, 1]);
+    let along = |axis: DVec3| {
+        let at = corners.map(|c| c.dot(axis));
+        at.into_iter().fold(f64::NEG_INFINITY, f64::max)
+            - at.into_iter().fold(f64::INFINITY, f64::min)
+    };
+    along(camera.right).max(along(camera.up))
 }
 
 /// All pictures side by side.

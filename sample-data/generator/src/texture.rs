@@ -60,7 +60,7 @@ pub(crate) fn leaves(p: &Parameters, seed: u64) -> Texture {
                 base: Vec2::new(0.5, if single { 0.98 } else { 0.97 - 0.72 * t }),
                 direction: Vec2::new(lean, -1.0).normalize(),
                 length: length * rng.random_range(0.9..1.0),
-                width: if p.needle { 0.028 } else { 0.42 },
+                width: if p.needle { 0.16 } else { 0.42 },
                 shade: rng.random_range(0.75..1.25),
             }
         })

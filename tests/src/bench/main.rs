@@ -2,9 +2,11 @@
 //! soup. Prints Markdown. Every case runs in a process of its own, so that its peak of memory is its
 //! own; runs of both programs alternate, because machines drift: compare ratios and medians.
 
+mod coverage;
+
 use anyhow::{Context, Result, bail};
 use forest_import::{Block, Limits};
-use forest_points::{BakeOptions, SurfelSize, bake};
+use forest_points::{BakeOptions, RadiusRule, SurfelSize, bake};
 use forest_sample_data::{Species, grow};
 use forest_soup::TriangleSoup;
 use serde::{Deserialize, Serialize};
@@ -178,6 +180,7 @@ fn report() -> Result<()> {
         "Seconds by stage; those of surfels, cluster, sort and triangles are summed over threads.\n"
     );
     table(&full);
+    coverage_report(&names)?;
     println!("\n## Size: one surfel a triangle, points only\n");
     let mut sizes = Vec::new();
     for n in ["200000", "2000000", "20000000"] {
@@ -193,6 +196,33 @@ fn report() -> Result<()> {
             last.0,
             first.0
         );
+    }
+    Ok(())
+}
+
+fn coverage_report(names: &[String]) -> Result<()> {
+    println!("\n## Coverage of cuts\n");
+    println!(
+        "Signed error of the mean coverage against the triangles' picture, over 16 views, with the \
+         worst view in brackets; points of each cut. Pictures of {0}×{0} pixels, 64 samples each.\n",
+        coverage::SIDE
+    );
+    let cuts: Vec<String> = coverage::CUTS.iter().map(|c| format!("s_m {c} px²")).collect();
+    println!("| tree | radius | {} |", cuts.join(" | "));
+    println!("|---|---|{}", "---|".repeat(cuts.len()));
+    for name in names {
+        let soup = soup(name)?;
+        for radius in [RadiusRule::Opacity, RadiusRule::Area, RadiusRule::Paper] {
+            let rows = coverage::measure(&soup, radius)?;
+            let cells: Vec<String> = rows
+                .iter()
+                .map(|r| {
+                    let (mean, worst) = (100.0 * r.error, 100.0 * r.worst);
+                    format!("{mean:+.1} % ({worst:+.1}), {}", r.points)
+                })
+                .collect();
+            println!("| {} | {radius:?} | {} |", short(name), cells.join(" | "));
+        }
     }
     Ok(())
 }

@@ -1,0 +1,80 @@
+# The commands people and CI run.
+#
+#   make demo     set up, build, bake sample-data, draw preview pictures, say where they are
+#   make test     set up, format check, clippy, docs, all tests
+#   make check    format check, clippy and docs only
+#   make bench    measure bakes; writes docs/BENCH.md
+#   make golden   write the golden packs anew, after a meant change of the format
+#   make samples  grow sample-data anew
+#   make fuzz     fuzz the pack reader for T seconds a target (default 60)
+#   make deny     licences, sources and bans by cargo-deny, if it is installed
+
+CARGO ?= cargo
+OUT := out
+T ?= 60
+
+.PHONY: demo test check bench golden samples fuzz deny setup
+
+# What the build needs from the system: a linker with C and C++ compilers, for zstd and meshoptimizer.
+setup:
+	@command -v $(CARGO) >/dev/null || { echo "cargo is missing: install Rust from https://rustup.rs"; exit 1; }
+	@missing=; \
+	command -v cc >/dev/null || missing="$$missing gcc"; \
+	command -v c++ >/dev/null || missing="$$missing g++"; \
+	echo '#include <stdlib.h>' | cc -E - >/dev/null 2>&1 || missing="$$missing libc6-dev"; \
+	if [ -n "$$missing" ]; then \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "installing:$$missing"; apt-get update -qq && apt-get install -y -qq $$missing; \
+	  else echo "install these packages first: sudo apt-get install$$missing"; exit 1; fi; fi
+
+demo: setup
+	$(CARGO) build --release --workspace --bins
+	@mkdir -p $(OUT)
+	@for tree in conifer.glb broadleaf_young.gltf shrub.obj; do \
+	  name=$${tree%.*}; \
+	  target/release/forest-bake points sample-data/$$tree -o $(OUT)/$$name.fpack --force && \
+	  target/release/forest-bake verify $(OUT)/$$name.fpack && \
+	  target/release/forest-bake draw $(OUT)/$$name.fpack -o $(OUT)/$$name.png \
+	    --size 512 --finest 0.25,9,100,900 -q || exit 1; done
+	@target/release/forest-bake points sample-data/conifer.glb \
+	  "sample-data/broadleaf_young.gltf@4.5,0,1:yaw=70" "sample-data/shrub.obj@2,0,3:yaw=20,scale=1.3" \
+	  "sample-data/shrub.obj@-2.4,0,2.2:yaw=200" -o $(OUT)/block.fpack --force
+	@target/release/forest-bake draw $(OUT)/block.fpack -o $(OUT)/block.png --size 768 --view 15,8 -q
+	@target/release/forest-bake levels sample-data/conifer.glb > $(OUT)/conifer-levels.txt
+	@target/release/forest-bake inspect $(OUT)/block.fpack
+	@echo; echo "Packs:    $(OUT)/*.fpack"; \
+	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together)"; \
+	echo "Report:   $(OUT)/conifer-levels.txt (what each radius rule and order keeps, by level)"
+
+check: setup
+	@rustup component add rustfmt clippy >/dev/null 2>&1 || true
+	$(CARGO) fmt --all -- --check
+	$(CARGO) clippy --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --quiet
+
+test: check
+	$(CARGO) build --workspace --bins
+	$(CARGO) test --workspace
+
+bench: setup
+	$(CARGO) build --release --workspace --bins
+	target/release/bench > docs/BENCH.md.new && mv docs/BENCH.md.new docs/BENCH.md
+	@cat docs/BENCH.md
+
+golden: setup
+	$(CARGO) run --release -p forest-tests --bin golden
+
+samples: setup
+	$(CARGO) build --release --workspace --bins
+	target/release/forest-sample-data --species conifer --seed 1 --triangles 20000 -o sample-data/conifer.glb
+	target/release/forest-sample-data --species broadleaf --seed 2 --triangles 42000 -o sample-data/broadleaf_young.gltf
+	target/release/forest-sample-data --species shrub --seed 3 --triangles 4000 -o sample-data/shrub.obj
+
+fuzz: setup
+	@command -v cargo-fuzz >/dev/null || $(CARGO) install cargo-fuzz --locked
+	cd tests/fuzz && for target in container sections; do \
+	  RUSTC_BOOTSTRAP=1 cargo fuzz run -s none $$target -- -max_total_time=$(T) -max_len=65536 || exit 1; done
+
+deny:
+	@command -v cargo-deny >/dev/null || { echo "cargo install cargo-deny --locked"; exit 1; }
+	cargo deny check bans licenses sources
