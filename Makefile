@@ -3,7 +3,8 @@
 #   make demo     set up, build, bake sample-data, draw preview pictures, say where they are
 #   make test     set up, format check, clippy, docs, all tests
 #   make check    format check, clippy and docs only
-#   make bench    measure bakes; writes docs/BENCH.md
+#   make bench    measure bakes; writes docs/BENCH.md and docs/LEVELS.txt
+#   make picture  draw the README's picture anew
 #   make golden   write the golden packs anew, after a meant change of the format
 #   make samples  grow sample-data anew
 #   make fuzz     fuzz the pack reader for T seconds a target (default 60)
@@ -13,7 +14,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: demo test check bench golden samples fuzz deny setup
+.PHONY: demo test check bench picture golden samples fuzz deny setup
 
 # What the build needs from the system: a linker with C and C++ compilers, for zstd and meshoptimizer.
 setup:
@@ -59,7 +60,14 @@ test: check
 bench: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/bench > docs/BENCH.md.new && mv docs/BENCH.md.new docs/BENCH.md
+	target/release/forest-bake levels sample-data/conifer.glb > docs/LEVELS.txt
 	@cat docs/BENCH.md
+
+picture: setup
+	$(CARGO) build --release --workspace --bins
+	@mkdir -p $(OUT)
+	target/release/forest-bake points sample-data/conifer.glb -o $(OUT)/conifer.fpack --force
+	target/release/forest-bake draw $(OUT)/conifer.fpack -o docs/levels.png --size 380 --finest 0.25,9,100,900
 
 golden: setup
 	$(CARGO) run --release -p forest-tests --bin golden

@@ -162,6 +162,9 @@ fn draw_writes_pictures_that_show_the_tree() {
     assert!(2 * green > seen.len(), "{green} of {}", seen.len());
     let (code, _, err) = run(&["draw", &pack, "-o", &arg(&png), "--view", "sideways"]);
     assert!(code == 1 && err.contains("sideways"));
+    let jpg = dir.path().join("a.jpg");
+    let (code, _, err) = run(&["draw", &pack, "-o", &arg(&jpg)]);
+    assert!(code == 1 && err.contains(".png") && !jpg.exists());
 }
 
 #[test]

@@ -34,17 +34,24 @@ fn sections_corpus_ends_in_a_value_or_an_error() {
 /// replaced by extremes, hashes made good.
 #[test]
 fn extreme_words_in_any_section_never_panic() {
-    let golden = std::fs::read(golden::all()[3].path()).unwrap();
-    let pack = forest_tests::open(&golden).unwrap();
+    // The points, many and alike, are sampled.
+    for golden in golden::all() {
+        extreme_words(&std::fs::read(golden.path()).unwrap());
+    }
+}
+
+fn extreme_words(golden: &[u8]) {
+    let pack = forest_tests::open(golden).unwrap();
     let sections: Vec<Vec<u8>> =
         pack.sections().map(|(id, _)| pack.bytes(id, 1 << 20).unwrap().into_owned()).collect();
     let mut refused = 0;
     for (which, original) in sections.iter().enumerate() {
-        for at in (0..original.len().saturating_sub(3)).step_by(4) {
+        let step = 4 * original.len().div_ceil(4 * 150).max(1);
+        for at in (0..original.len().saturating_sub(3)).step_by(step) {
             for word in [0u32, 1, 0x7fff_ffff, 0x8000_0000, 0xffff_ffff, 0x7f80_0000] {
                 let mut data = original.clone();
                 data[at..at + 4].copy_from_slice(&word.to_le_bytes());
-                let forged = with_section(&golden, which as u8, &data).unwrap();
+                let forged = with_section(golden, which as u8, &data).unwrap();
                 refused += usize::from(use_pack(&forged).is_err());
             }
         }

@@ -3,6 +3,7 @@
 pub mod golden;
 pub mod soups;
 
+use forest_draw::{Style, Surfaces, draw_points};
 use forest_pack::header::{self, Meta};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::{
@@ -25,7 +26,7 @@ pub fn bake_bytes(
     let path = dir.path().join("t.fpack");
     let mut writer = PackWriter::create(&path)?;
     let meta = Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] };
-    writer.add(SectionId::new(kind::META, 0), Codec::None, &header::encode(&meta))?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &meta)?;
     let report = bake(soup, options, &mut writer, &|_| {})?;
     writer.finish()?;
     Ok((std::fs::read(&path).expect("the pack that was just written"), report))
@@ -40,7 +41,7 @@ pub fn open(bytes: &[u8]) -> Result<Pack, PackError> {
 }
 
 /// Everything that a viewer would do with an untrusted pack: open, verify, validate, read materials,
-/// select from afar and from inside. Any bytes must end in a value or an error.
+/// draw from afar and from inside. Any bytes must end in a value or an error.
 ///
 /// # Errors
 /// When the pack breaks a rule.
@@ -49,9 +50,12 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
     let block = PointsBlock::open(&pack)?;
-    if !block.triangles.is_empty() {
-        read_materials(&pack)?;
-    }
+    let surfaces = if block.triangles.is_empty() {
+        None
+    } else {
+        let (materials, textures) = read_materials(&pack)?;
+        Some(Surfaces::new(&materials, &textures))
+    };
     let projection = Projection::Perspective { fov_y: 1.0 };
     let mut drawn = 0;
     for distance in [0.0, 1.0, 1e4] {
@@ -60,6 +64,9 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         let thresholds = Thresholds { depth_bias: PixelArea(3.0), ..Thresholds::default() };
         let cut = select(&block, &camera, &thresholds);
         drawn += cut.points(&block).count() + cut.triangle_count() as usize;
+        let small = Camera { width: 16, height: 16, ..camera };
+        let style = Style { samples: 1, ..Style::default() };
+        draw_points(&block, surfaces.as_ref(), &small, &thresholds, &style);
     }
     Ok(drawn)
 }

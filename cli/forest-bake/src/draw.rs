@@ -7,7 +7,9 @@ use forest_pack::Pack;
 use forest_points::{PixelArea, PointsBlock, Thresholds, read_materials};
 use forest_soup::{Camera, Projection};
 use glam::DVec3;
-use std::path::PathBuf;
+use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -59,6 +61,11 @@ enum LightArg {
 const BACKGROUND: f32 = 0.6;
 
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+    if args.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+        return Err(
+            Usage(format!("{}: pictures are written as .png", args.output.display())).into()
+        );
+    }
     let pack = Pack::open(&args.pack)?;
     let block = PointsBlock::open(&pack)?;
     let surfaces = if block.triangles.is_empty() {
@@ -147,30 +154,30 @@ fn extent(corners: &[DVec3; 8], from: DVec3) -> f64 {
     along(camera.right).max(along(camera.up))
 }
 
-/// All pictures side by side.
+/// All pictures side by side, written whole or not at all.
 fn write(args: &Args, pictures: &[Picture]) -> Result<()> {
-    let n = pictures.len() as u32;
-    let side = args.size;
-    let name = || args.output.display().to_string();
-    let file = |e: image::ImageError| match e {
-        image::ImageError::IoError(e) => anyhow::Error::new(e),
-        e => e.into(),
-    };
-    if args.alpha {
-        let rows: Vec<_> = pictures.iter().map(Picture::straight).collect();
-        let at =
-            |x: u32, y: u32| image::Rgba(rows[(x / side) as usize][(y * side + x % side) as usize]);
-        image::RgbaImage::from_fn(side * n, side, at)
-            .save(&args.output)
-            .map_err(file)
-            .with_context(name)
+    let (n, side) = (pictures.len() as u32, args.size);
+    let (picture, x) =
+        (|x: u32| (x / side) as usize, |x: u32, y: u32| (y * side + x % side) as usize);
+    let sheet: DynamicImage = if args.alpha {
+        let pixels: Vec<_> = pictures.iter().map(Picture::straight).collect();
+        RgbaImage::from_fn(side * n, side, |i, j| image::Rgba(pixels[picture(i)][x(i, j)])).into()
     } else {
-        let rows: Vec<_> = pictures.iter().map(|p| p.over(BACKGROUND)).collect();
-        let at =
-            |x: u32, y: u32| image::Rgb(rows[(x / side) as usize][(y * side + x % side) as usize]);
-        image::RgbImage::from_fn(side * n, side, at)
-            .save(&args.output)
-            .map_err(file)
-            .with_context(name)
+        let pixels: Vec<_> = pictures.iter().map(|p| p.over(BACKGROUND)).collect();
+        RgbImage::from_fn(side * n, side, |i, j| image::Rgb(pixels[picture(i)][x(i, j)])).into()
+    };
+    let mut png = Cursor::new(Vec::new());
+    sheet.write_to(&mut png, ImageFormat::Png)?;
+    let name = || args.output.display().to_string();
+    let folder = args.output.parent().filter(|p| !p.as_os_str().is_empty());
+    let mut file = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.permissions(std::fs::Permissions::from_mode(0o666));
     }
+    let mut file = file.tempfile_in(folder.unwrap_or(Path::new("."))).with_context(name)?;
+    file.write_all(png.get_ref()).with_context(name)?;
+    file.persist(&args.output).map_err(|e| e.error).with_context(name)?;
+    Ok(())
 }

@@ -5,7 +5,7 @@ use crate::output;
 use crate::source::{LoadedSource, PointsOptions, SourceArgs};
 use anyhow::Result;
 use forest_pack::header::{self, Meta};
-use forest_pack::{Codec, Pack, PackWriter, SectionId, kind};
+use forest_pack::{Pack, PackWriter, SectionId, kind};
 use forest_points::{BakeOptions, BakeReport, Order, RadiusRule, bake};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -61,8 +61,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let kept = existing(args, &source.meta)?;
     let options = args.bake_options(source.trees)?;
     let mut writer = PackWriter::create(&args.output)?;
-    let meta = SectionId::new(kind::META, 0);
-    writer.add(meta, Codec::None, &header::encode(&source.meta))?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
     let bar = output::bar(source.soup.triangles.len() as u64, "points", quiet);
     let report = bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
     bar.finish_and_clear();

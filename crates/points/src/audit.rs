@@ -62,6 +62,9 @@ pub fn audit(
             },
         )
         .collect();
+    if cells.iter().all(Vec::is_empty) {
+        return Err(crate::BakeError::NothingVisible(ready.counts));
+    }
     let levels = LEVELS.enumerate().map(|(k, l)| {
         let mut sum = Sums::default();
         cells.iter().filter_map(|c| c.get(k)).for_each(|s| sum.add(s));

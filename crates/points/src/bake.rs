@@ -15,13 +15,15 @@ use crate::timing::StageTimes;
 use crate::triangle::TriangleEncoder;
 use forest_pack::{Codec, PackError, PackWriter, SectionId, Spool, header, kind};
 use forest_soup::{Bounds, InvalidSoup, TriangleSoup};
-use glam::DVec3;
 use rayon::prelude::*;
 use std::io::Write;
 use std::path::Path;
 
-/// Source triangles whose cells are baked before they are written: bounds the memory of a bake.
-const BATCH: usize = 1 << 22;
+/// Surfels (as estimated) whose cells are baked before they are written: bounds a bake's memory.
+const BATCH: f64 = (1u64 << 22) as f64;
+
+/// Surfels that a bake may be estimated to make: their points still have 32-bit indices.
+const MOST_SURFELS: f64 = (1u64 << 31) as f64;
 
 /// Why a soup could not be baked.
 #[derive(Debug, thiserror::Error)]
@@ -83,7 +85,13 @@ pub fn bake(
 
     let mut sections = Sections::default();
     let mut done = 0u64;
-    for batch in batches(&lists) {
+    let estimates: Vec<f64> =
+        (0..lists.len()).into_par_iter().map(|c| shader.estimate(lists.of(c))).collect();
+    let estimate: f64 = estimates.iter().sum();
+    if estimate > MOST_SURFELS {
+        return Err(BakeError::TooManyPoints(estimate as u64));
+    }
+    for batch in batches(&estimates) {
         let baked: Vec<_> = batch
             .clone()
             .into_par_iter()
@@ -141,7 +149,7 @@ pub(crate) struct Preparation<'a> {
     frame: BlockFrame,
     pub(crate) lists: CellLists,
     pub(crate) baker: CellBaker<'a>,
-    counts: BakeCounts,
+    pub(crate) counts: BakeCounts,
     times: StageTimes,
 }
 
@@ -190,7 +198,7 @@ fn check(options: &BakeOptions) -> Result<(), BakeError> {
         return fail("--alpha-tolerance", t.to_string(), "between 0 and 1");
     }
     if let crate::GridChoice::Fixed(n) = options.grid
-        && (n.contains(&0) || n.iter().map(|&n| u64::from(n)).product::<u64>() > 1 << 20)
+        && (n.contains(&0) || cells_of(n).is_none_or(|cells| cells > 1 << 20))
     {
         return fail(
             "--grid",
@@ -201,6 +209,10 @@ fn check(options: &BakeOptions) -> Result<(), BakeError> {
     Ok(())
 }
 
+fn cells_of(grid: [u32; 3]) -> Option<u64> {
+    grid.iter().try_fold(1u64, |cells, &n| cells.checked_mul(u64::from(n)))
+}
+
 /// Counts of a soup that has no extent at all.
 fn count_unusable(soup: &TriangleSoup, mut counts: BakeCounts) -> BakeCounts {
     let finite = |i: usize| soup.corners(i).iter().all(|p| p.is_finite());
@@ -209,18 +221,18 @@ fn count_unusable(soup: &TriangleSoup, mut counts: BakeCounts) -> BakeCounts {
     counts
 }
 
-/// Ranges of cells with at most [`BATCH`] triangles each (or one cell).
-fn batches(lists: &CellLists) -> Vec<std::ops::Range<usize>> {
+/// Ranges of cells with at most [`BATCH`] surfels each (or one cell).
+fn batches(estimates: &[f64]) -> Vec<std::ops::Range<usize>> {
     let mut ranges = Vec::new();
-    let mut start = 0;
-    for c in 0..lists.len() {
-        let size = lists.starts[c + 1] - lists.starts[start];
-        if size as usize > BATCH && c > start {
+    let (mut start, mut size) = (0, 0.0);
+    for (c, estimate) in estimates.iter().enumerate() {
+        size += estimate;
+        if size > BATCH && c > start {
             ranges.push(start..c);
-            start = c;
+            (start, size) = (c, *estimate);
         }
     }
-    ranges.push(start..lists.len());
+    ranges.push(start..estimates.len());
     ranges
 }
 
@@ -288,7 +300,7 @@ impl Sections {
             points: points.len() as u32,
             first_triangle: self.triangle_count as u32,
             triangles: 0,
-            center: DVec3::ZERO.as_vec3().to_array(),
+            center: bounds.center().as_vec3().to_array(),
             radius: bounds.half_diagonal() as f32,
             root_parent: SizeCode::INFINITE.bits(),
             top: 1,
@@ -304,7 +316,7 @@ impl Sections {
 
     fn write(self, header: &PointsHeader, writer: &mut PackWriter) -> Result<(), PackError> {
         let id = |kind| SectionId::new(kind, 0);
-        writer.add(id(kind::POINTS_HEADER), Codec::None, &header::encode(header))?;
+        header::write(writer, id(kind::POINTS_HEADER), header)?;
         let cells: &[u8] = bytemuck::cast_slice(&self.cells);
         writer.add(id(kind::POINTS_CELLS), Codec::None, cells)?;
         writer.add_spool(id(kind::POINTS), self.points)?;

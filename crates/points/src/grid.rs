@@ -43,6 +43,13 @@ pub(crate) struct CellLists {
 
 const NO_CELL: u32 = u32::MAX;
 
+/// a + b + c, rounded alike whatever the order: duplicates of a triangle must meet in one cell.
+fn sum(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
+    let (low, high) = (a.min(b), a.max(b));
+    let middle = low.max(high.min(c));
+    low.min(c) + high.max(c) + middle
+}
+
 impl CellLists {
     /// Sorts triangles into the cells of their centroids.
     pub(crate) fn new(soup: &TriangleSoup, frame: &BlockFrame, choice: GridChoice) -> Self {
@@ -59,7 +66,7 @@ impl CellLists {
                 return NO_CELL;
             }
             let [a, b, c] = corners.map(|p| frame.map(p));
-            let at = ((a + b + c) / 3.0 - min) * per_unit;
+            let at = (sum(a, b, c) / 3.0 - min) * per_unit;
             let [x, y, z]: [u32; 3] = std::array::from_fn(|k| (at[k] as u32).min(dims[k] - 1));
             (y * dims[2] + z) * dims[0] + x
         };

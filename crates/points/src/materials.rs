@@ -1,7 +1,7 @@
 //! Materials and textures as the pack holds them.
 
 use forest_pack::header::{self, MaterialHeader, Materials, TextureHeader};
-use forest_pack::{Codec, Compressed, Pack, PackError, PackWriter, SectionId, kind};
+use forest_pack::{Compressed, Pack, PackError, PackWriter, SectionId, kind};
 use forest_soup::{AlphaMode, Material, Texture, Wrap};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -10,6 +10,9 @@ const ID: SectionId = SectionId::new(kind::MATERIALS, 0);
 
 /// Largest texture that is read back: 16384² RGBA.
 const MAX_TEXTURE_BYTES: u64 = 1 << 30;
+
+/// Most that all textures of a pack may decode to.
+const MAX_BYTES: u64 = 8 << 30;
 
 /// Writes sections `materials` and `texture[n]`.
 ///
@@ -24,7 +27,7 @@ pub fn write_materials(
         materials: materials.iter().map(material_header).collect(),
         textures: textures.iter().map(|t| texture_header(t)).collect(),
     };
-    writer.add(ID, Codec::None, &header::encode(&table))?;
+    header::write(writer, ID, &table)?;
     let packed: Vec<_> = textures
         .par_iter()
         .map(|t| Compressed::new(bytemuck::cast_slice(&t.texels)))
@@ -65,6 +68,12 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
             unlit: m.unlit,
         });
     }
+    let texels = |t: &TextureHeader| u64::from(t.width) * u64::from(t.height);
+    let bytes =
+        table.textures.iter().map(|t| texels(t).saturating_mul(4)).fold(0, u64::saturating_add);
+    if bytes > MAX_BYTES {
+        return Err(invalid(format!("{bytes} bytes of textures; the limit is {MAX_BYTES}")));
+    }
     let mut textures = Vec::new();
     for (i, t) in (0..).zip(table.textures) {
         textures.push(Arc::new(read_texture(pack, SectionId::new(kind::TEXTURE, i), t)?));
@@ -74,7 +83,7 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
 
 fn read_texture(pack: &Pack, id: SectionId, t: TextureHeader) -> Result<Texture, PackError> {
     let bytes = pack.bytes(id, MAX_TEXTURE_BYTES)?;
-    let want = u64::from(t.width) * u64::from(t.height) * 4;
+    let want = (u64::from(t.width) * u64::from(t.height)).saturating_mul(4);
     if t.width == 0 || t.height == 0 || bytes.len() as u64 != want {
         let problem = format!("{} bytes for {}×{} texels", bytes.len(), t.width, t.height);
         return Err(PackError::invalid(pack.path(), id, problem));

@@ -7,6 +7,8 @@
 //! * a surfel is drawn iff `parent > fine` and `own ≤ coarse`;
 //! * a cluster's point is drawn iff `parent > fine` and `own ≤ fine`.
 //!
+//! In a pack without triangles `coarse` is the largest size: all surfels may be drawn.
+//!
 //! Sizes grow towards the root, and a triangle has the size of its surfels, so that for any
 //! thresholds every source triangle is represented exactly once. Points being sorted by their
 //! parent's size, the first two words of each rule are a prefix of the cell's array.
@@ -119,7 +121,8 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
     // Projected area to area in block space.
     let to_block = |area: f64, d: f64| {
         let pixels = camera.pixels_per_unit(d) * scale;
-        area.max(0.0) / (pixels * pixels)
+        // An infinite threshold stays one even where a pixel covers nothing.
+        if area == f64::INFINITY { area } else { area.max(0.0) / (pixels * pixels) }
     };
     let d1 = distance(block.origin());
     let block_fine = code(SizeCode::at_most(to_block(t.finest.0, d1)));
@@ -135,7 +138,12 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
         let bias = t.depth_bias.0 * depth;
         let fine_area = to_block(t.finest.0 + bias, d2);
         let coarse_area = to_block(t.largest.0 + bias, d2).max(fine_area);
-        let coarse = code(SizeCode::at_most(coarse_area));
+        // Without triangles nothing can stand in for a surfel, however large.
+        let coarse = if exact && block.triangles.is_empty() {
+            i32::from(SizeCode::MAX.bits())
+        } else {
+            code(SizeCode::at_most(coarse_area))
+        };
         let (fine, points) = match block.header.order {
             Order::Exact => {
                 let fine = if cell.is_top() {

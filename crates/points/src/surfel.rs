@@ -60,6 +60,9 @@ const OPAQUE_PIECE_SAMPLES: u32 = 1;
 const TRANSLUCENT_SAMPLES: u32 = 9;
 const TRANSLUCENT_PIECE_SAMPLES: u32 = 4;
 
+/// Samples (as a power of two) of a masked piece under vertex alpha.
+const MASK_SAMPLES: u32 = 7;
+
 /// What surfels are made with: shaded textures and limits. Shared by all threads.
 pub(crate) struct SurfelShader<'a> {
     soup: &'a TriangleSoup,
@@ -108,9 +111,20 @@ impl<'a> SurfelShader<'a> {
                 (b.y / 256.0).max(b.length() / 4096.0)
             }
             SurfelSize::Triangle => f64::INFINITY,
-            SurfelSize::Units(s) => frame.length(s),
+            SurfelSize::Units(s) => frame.length(s).max(f64::MIN_POSITIVE),
         };
         Self { soup, frame, shades, size, tolerance: options.alpha_tolerance }
+    }
+
+    /// Surfels that the triangles will make, roughly and from above.
+    pub(crate) fn estimate(&self, triangles: &[u32]) -> f64 {
+        let most = f64::from(1u32 << MAX_DEPTH);
+        let one = |&t: &u32| {
+            let [a, b, c] = self.soup.corners(t as usize).map(|p| self.frame.map(p));
+            let area = 0.5 * (b - a).cross(c - a).length();
+            1.0 + (2.0 * area / (self.size * self.size)).min(most)
+        };
+        triangles.iter().map(one).sum()
     }
 
     /// The surfel size, in block units; infinite for one surfel a triangle.
@@ -154,6 +168,7 @@ struct Key {
 /// largest piece, and what it shows.
 #[derive(Clone, Copy)]
 struct Piece {
+    part: Part,
     at: [f32; 2],
     area: f32,
     /// Premultiplied linear RGBA.
@@ -263,7 +278,7 @@ impl Pieces {
     }
 
     fn whole(rgba: [f32; 4]) -> Self {
-        Self::One([Piece { at: [1.0 / 3.0; 2], area: 1.0, rgba }])
+        Self::One([Piece { part: WHOLE, at: [1.0 / 3.0; 2], area: 1.0, rgba }])
     }
 }
 
@@ -272,7 +287,7 @@ fn cut(edges: [f64; 3], depth: u32, rgba: impl Fn(Part) -> [f32; 4]) -> Rc<[Piec
     let mut list = Vec::with_capacity(1 << depth);
     bisect(WHOLE, edges, depth, &mut |part| {
         let at = ((part[0] + part[1] + part[2]) / 3.0).to_array();
-        list.push(Piece { at, area: 1.0, rgba: rgba(part) });
+        list.push(Piece { part, at, area: 1.0, rgba: rgba(part) });
     });
     list.into()
 }
@@ -407,38 +422,43 @@ fn vertex_colors(soup: &TriangleSoup, i: usize) -> Option<[[f32; 4]; 3]> {
     Some(soup.triangles[i].map(|v| soup.colors[v as usize]))
 }
 
-/// A piece's colour under vertex colours, which are taken at its centroid. Under a mask with
-/// vertex alpha the coverage is counted anew, over the whole triangle's texture.
+/// A piece's colour under vertex colours, which are taken at its centroid. Under a mask, vertex
+/// alpha moves the cutoff: the piece's coverage is then counted anew, sample by sample.
 fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f32; 4] {
-    let [u, v] = piece.at;
-    let color: [f32; 4] =
-        std::array::from_fn(|k| colors[0][k] * (1.0 - u - v) + colors[1][k] * u + colors[2][k] * v);
+    let color_at = |[u, v]: [f32; 2]| -> [f32; 4] {
+        std::array::from_fn(|k| {
+            let c = colors[0][k] * (1.0 - u - v) + colors[1][k] * u + colors[2][k] * v;
+            c.clamp(0.0, 1.0)
+        })
+    };
+    let color = color_at(piece.at);
     let index = s.soup.triangle_materials[i] as usize;
     let material = &s.soup.materials[index];
+    let opaque = colors.iter().all(|c| c[3] >= 1.0);
     let coverage = match (material.alpha_mode, &s.shades[index].raw) {
-        (AlphaMode::Opaque, _) => 1.0,
-        (AlphaMode::Blend, _) => color[3],
+        (AlphaMode::Opaque, _) => piece.rgba[3],
+        (AlphaMode::Blend, _) => piece.rgba[3] * color[3],
+        (AlphaMode::Mask { .. }, _) if opaque => piece.rgba[3],
         // Of a mask without texture all or nothing passes.
         (AlphaMode::Mask { .. }, None) => material.coverage(1.0, color[3]),
         (AlphaMode::Mask { cutoff }, Some(raw)) => {
-            let [a, b, c] = triangle_uv(s.soup, i);
-            let passes = |w: Part| {
+            let uv = triangle_uv(s.soup, i);
+            let mut inside = 0u32;
+            bisect(piece.part, [2.0, 1.0, 1.0], MASK_SAMPLES, &mut |w| {
                 let at = (w[0] + w[1] + w[2]) / 3.0;
-                raw.sample(a + (b - a) * at.x + (c - a) * at.y)[3] * color[3] >= cutoff
-            };
-            let (mut inside, mut all) = (0u32, 0u32);
-            bisect(WHOLE, [2.0, 1.0, 1.0], TRANSLUCENT_SAMPLES, &mut |w| {
-                inside += u32::from(passes(w));
-                all += 1;
+                let texel = raw.sample(part_uv(uv, [at; 3])[0])[3];
+                inside += u32::from(texel * color_at(at.to_array())[3] >= cutoff);
             });
-            let coverage = inside as f32 / all as f32;
-            let plain = piece.rgba[3].max(f32::MIN_POSITIVE);
-            return std::array::from_fn(|k| {
-                if k == 3 { coverage } else { piece.rgba[k] / plain * coverage * color[k] }
-            });
+            inside as f32 / (1u32 << MASK_SAMPLES) as f32
         }
     };
-    std::array::from_fn(|k| piece.rgba[k] * coverage * if k == 3 { 1.0 } else { color[k] })
+    if coverage <= 0.0 || piece.rgba[3] <= 0.0 {
+        return [0.0; 4];
+    }
+    std::array::from_fn(|k| match k {
+        3 => coverage,
+        k => piece.rgba[k] / piece.rgba[3] * coverage * color[k],
+    })
 }
 
 /// Direction of the surfel's axis as a vector.

@@ -113,6 +113,10 @@ impl<'a> TriangleEncoder<'a> {
     }
 }
 
+/// Coordinates beyond this many repeats are an exporter's garbage (their own spacing is then a tenth
+/// of a texture): they are read as zero, and so do not spoil the material's steps.
+const FARTHEST_UV: f32 = 1e6;
+
 /// Texture coordinates of triangle `i`, moved by whole repeats of a wrapping texture to start in
 /// 0..1 (0..2 under mirrors): quantised steps are then small, however often the bark repeats.
 fn near_zero(soup: &TriangleSoup, i: usize, wraps: [Wrap; 2]) -> [Vec2; 3] {
@@ -120,7 +124,7 @@ fn near_zero(soup: &TriangleSoup, i: usize, wraps: [Wrap; 2]) -> [Vec2; 3] {
         return [Vec2::ZERO; 3];
     }
     let uvs = soup.triangles[i].map(|v| soup.uvs[v as usize]);
-    let uvs = uvs.map(|uv| if uv.is_finite() { uv } else { Vec2::ZERO });
+    let uvs = uvs.map(|uv| if uv.abs().max_element() < FARTHEST_UV { uv } else { Vec2::ZERO });
     let least = uvs[0].min(uvs[1]).min(uvs[2]);
     let shift = |wrap: Wrap, v: f32| match wrap {
         Wrap::Repeat => v.floor(),

@@ -6,6 +6,7 @@ use crate::options::{Order, RadiusRule};
 use crate::record::PointRecord;
 use crate::size::SizeCode;
 use forest_pack::kind;
+use std::collections::BTreeSet;
 
 /// The section kind and the broken rule.
 type Broken = (u16, String);
@@ -105,9 +106,9 @@ fn cells(block: &PointsBlock) -> Result<(), Broken> {
             );
         }
     }
-    if block.cells.is_empty() {
+    let Some((top, cells)) = block.cells.split_last() else {
         return Err((kind::POINTS_CELLS, "no cell".into()));
-    }
+    };
     let ends = [
         (kind::POINTS, point, block.points.len()),
         (kind::POINTS_TRIANGLES, triangle, block.triangles.len()),
@@ -117,6 +118,12 @@ fn cells(block: &PointsBlock) -> Result<(), Broken> {
             return Err((kind, format!("{array} records; the cells hold {cells}")));
         }
     }
+    top_cell(block, top, cells).map_err(|problem| (kind::POINTS_CELLS, problem))?;
+    let (stored, kept) = (block.triangles.len() as u64, block.header.counts.triangles());
+    if stored != 0 && stored != kept {
+        let problem = format!("{stored} triangles; the header's counts leave {kept}");
+        return Err((kind::POINTS_TRIANGLES, problem));
+    }
     let colors = block.triangle_colors.len();
     if colors != 0 && colors != block.triangles.len() {
         let problem = format!("{colors} colours for {} triangles", block.triangles.len());
@@ -125,6 +132,30 @@ fn cells(block: &PointsBlock) -> Result<(), Broken> {
     if surfels != block.header.counts.surfels {
         let problem = format!("{surfels} surfels; the header says {}", block.header.counts.surfels);
         return Err((kind::POINTS_CELLS, problem));
+    }
+    Ok(())
+}
+
+/// The block's own tree: no triangles, no surfels, and above every cell exactly if it has points.
+fn top_cell(block: &PointsBlock, top: &CellRecord, cells: &[CellRecord]) -> Result<(), String> {
+    let infinite = SizeCode::INFINITE.bits();
+    if top.triangles != 0 || top.surfels != 0 || top.root_parent != infinite {
+        return Err(format!(
+            "the block's own tree has {} triangles, {} surfels, parent {}; it must have none",
+            top.triangles, top.surfels, top.root_parent
+        ));
+    }
+    if block.header.order == Order::Paper && top.points != 0 {
+        return Err(format!("the paper's order has no tree above the cells, of {}", top.points));
+    }
+    // A cell's root hangs under a point of this tree: it has that point's size.
+    let sizes: BTreeSet<u16> = block.cell_points(top).iter().map(|p| p.own().bits()).collect();
+    for (i, cell) in cells.iter().enumerate() {
+        let parent = cell.root_parent;
+        let fits = if sizes.is_empty() { parent == infinite } else { sizes.contains(&parent) };
+        if !fits {
+            return Err(format!("cell {i}: no point of the block's own tree has size {parent}"));
+        }
     }
     Ok(())
 }

@@ -62,7 +62,7 @@ pub enum FlattenError {
         /// The limit given.
         limit: u64,
     },
-    /// More vertices than a 32-bit index can name.
+    /// More vertices than a 32-bit index can name, or than three for each triangle allowed.
     #[error("the model has {vertices} vertices once flattened; the limit is {limit}")]
     TooManyVertices {
         /// Vertices after flattening.
@@ -110,7 +110,8 @@ impl Model {
         };
         let mesh_of = |i: &Instance| &self.meshes[i.mesh as usize];
         let vertices: u64 = self.instances.iter().map(|i| mesh_of(i).positions.len() as u64).sum();
-        let limit = u64::from(u32::MAX);
+        // Vertices that no triangle uses would be memory for nothing.
+        let limit = u64::from(u32::MAX).min(max_triangles.saturating_mul(3).max(1 << 20));
         if vertices > limit {
             return Err(FlattenError::TooManyVertices { vertices, limit });
         }

@@ -5,6 +5,8 @@
 //! `map_d`; without `map_d`, the alpha of `map_Kd`. All faces are seen from both sides.
 
 use crate::ImportError;
+mod lines;
+
 use crate::picture;
 use crate::source::Source;
 use earcut::{Earcut, utils3d};
@@ -18,14 +20,11 @@ use std::sync::Arc;
 
 /// Reads an `.obj` and its material libraries.
 pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
-    let bytes = std::mem::take(&mut source.bytes);
-    // Lines and points have no area.
-    let options = tobj::LoadOptions {
-        single_index: true,
-        ignore_lines: true,
-        ignore_points: true,
-        ..tobj::LoadOptions::default()
-    };
+    let bytes =
+        lines::faces_only(&std::mem::take(&mut source.bytes)).map_err(|(line, index)| {
+            source.invalid(format!("line {line}"), format!("a face with the index {index:?}"))
+        })?;
+    let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
     // The parser asks for material libraries while it reads: note what went wrong with them.
     let failed = RefCell::new(None);
     let shared = RefCell::new(&mut *source);
@@ -34,7 +33,10 @@ pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
             .borrow_mut()
             .file("mtllib", &path.to_string_lossy())
         {
-            Ok(mtl) => tobj::load_mtl_buf(&mut BufReader::new(Cursor::new(mtl))),
+            Ok(mtl) => {
+                let mtl = lines::whole_colors(&mtl);
+                tobj::load_mtl_buf(&mut BufReader::new(Cursor::new(mtl)))
+            }
             Err(e) => {
                 failed.borrow_mut().get_or_insert(e);
                 Err(tobj::LoadError::OpenFileFailed)

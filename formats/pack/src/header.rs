@@ -2,7 +2,7 @@
 //!
 //! bincode is final upstream; this module is the only place that knows it.
 
-use crate::{Pack, PackError, SectionId};
+use crate::{Codec, Pack, PackError, PackWriter, SectionId};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 /// No header section is larger: 16 MiB.
@@ -14,12 +14,22 @@ const CONFIG: bincode::config::Configuration<
     bincode::config::Limit<LIMIT>,
 > = bincode::config::standard().with_fixed_int_encoding().with_limit::<LIMIT>();
 
-/// Encodes a header section.
+/// Adds `value` as header section `id`.
 ///
-/// # Panics
-/// When the value does not fit in [`LIMIT`] bytes: headers are small by design.
-pub fn encode<T: Serialize>(value: &T) -> Vec<u8> {
-    bincode::serde::encode_to_vec(value, CONFIG).expect("a header of at most 16 MiB")
+/// # Errors
+/// When the pack cannot be written, or `value` takes more than [`LIMIT`] bytes (names of a hundred
+/// thousand trees, say): a reader would refuse it.
+pub fn write<T: Serialize>(
+    writer: &mut PackWriter,
+    id: SectionId,
+    value: &T,
+) -> Result<(), PackError> {
+    let invalid = |problem: String| PackError::invalid(writer.path(), id, problem);
+    let bytes = bincode::serde::encode_to_vec(value, CONFIG).map_err(|e| invalid(e.to_string()))?;
+    if bytes.len() > LIMIT {
+        return Err(invalid(format!("{} bytes of header; the limit is {LIMIT}", bytes.len())));
+    }
+    writer.add(id, Codec::None, &bytes)
 }
 
 /// Decodes section `id` of `pack`; every byte of it must be used.

@@ -249,13 +249,14 @@ impl Pack {
 fn check_header(path: &Path, bytes: &[u8]) -> Result<FileHeader, PackError> {
     let invalid = |problem: String| PackError::invalid(path, "header", problem);
     let size = size_of::<FileHeader>();
+    let magic = &bytes[..bytes.len().min(MAGIC.len())];
+    if !MAGIC.starts_with(magic) {
+        return Err(invalid(format!("starts with {magic:02x?}: not an fpack")));
+    }
     if bytes.len() < size {
         return Err(invalid(format!("{} bytes; a pack has at least {size}", bytes.len())));
     }
     let header: FileHeader = bytemuck::pod_read_unaligned(&bytes[..size]);
-    if header.magic != MAGIC {
-        return Err(invalid(format!("starts with {:02x?}: not an fpack", header.magic)));
-    }
     if header.version != VERSION {
         let problem = format!("version {}; this build reads version {VERSION}", header.version);
         return Err(PackError::unsupported(path, "header", problem));

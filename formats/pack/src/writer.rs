@@ -1,11 +1,11 @@
 //! Writing: beside the target, then renamed over it.
 
 use crate::layout::{
-    ALIGNMENT, Codec, ENTRY_HASH, FileHeader, MAGIC, TableEntry, VERSION, section_hash, table_hash,
+    ALIGNMENT, Codec, ENTRY_HASH, FileHeader, MAGIC, MAX_SECTIONS, TableEntry, VERSION,
+    section_hash, table_hash,
 };
 use crate::{Pack, PackError, SectionId, Spool};
 use bytemuck::Zeroable;
-use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
@@ -52,7 +52,14 @@ impl PackWriter {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
         };
-        let file = tempfile::Builder::new()
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // As readable as any new file: the process's umask is taken off this.
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let file = builder
             .prefix(".fpack-")
             .tempfile_in(folder)
             .map_err(PackError::io(target, "cannot create a file beside it"))?;
@@ -64,6 +71,11 @@ impl PackWriter {
         };
         writer.put(&[0; size_of::<FileHeader>()])?;
         Ok(writer)
+    }
+
+    /// The file that will be written.
+    pub fn path(&self) -> &Path {
+        &self.target
     }
 
     /// Adds a section. Ids must be new to the pack.
@@ -134,7 +146,6 @@ impl PackWriter {
         self.out.seek(SeekFrom::Start(0)).map_err(failed)?;
         self.out.write_all(bytemuck::bytes_of(&header)).map_err(failed)?;
         let file = self.out.into_inner().map_err(|e| failed(e.into_error()))?;
-        keep_usual_permissions(file.as_file()).map_err(failed)?;
         file.persist(&self.target)
             .map_err(|e| PackError::io(&self.target, "cannot rename the finished file")(e.error))?;
         Ok(())
@@ -150,6 +161,10 @@ impl PackWriter {
     ) -> Result<(), PackError> {
         if self.table.iter().any(|e| (e.kind, e.index) == (id.kind, id.index)) {
             return Err(PackError::invalid(&self.target, id, "the section was already written"));
+        }
+        if self.table.len() >= MAX_SECTIONS as usize {
+            let problem = format!("more than {MAX_SECTIONS} sections");
+            return Err(PackError::invalid(&self.target, id, problem));
         }
         self.align()?;
         self.table.push(TableEntry {
@@ -174,16 +189,4 @@ impl PackWriter {
         self.position += bytes.len() as u64;
         self.out.write_all(bytes).map_err(PackError::io(&self.target, "cannot write"))
     }
-}
-
-/// Temporary files are private (0600); a finished pack is as readable as any new file.
-#[cfg(unix)]
-fn keep_usual_permissions(file: &File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn keep_usual_permissions(_: &File) -> std::io::Result<()> {
-    Ok(())
 }

@@ -43,17 +43,17 @@ impl Slices {
         let slices: Vec<Slice> =
             (0..self.count).map(|i| self.slice(f64::from(i) / n, f64::from(i + 1) / n)).collect();
         let largest = slices.iter().map(|s| s.area).fold(0.0, f64::max);
-        slices
-            .iter()
-            .map(|s| Piece {
+        let piece = |s: &Slice| {
+            let corners = [(s.from, 0.0), (s.to, 0.0), (s.along, 2.0 * s.up)];
+            let part = corners.map(|(t, h)| self.weights(t, h));
+            Piece {
+                part,
                 at: self.weights(s.along, s.up).to_array(),
                 area: (s.area / largest) as f32,
-                rgba: rgba(
-                    [(s.from, 0.0), (s.to, 0.0), (s.along, 2.0 * s.up)]
-                        .map(|(t, h)| self.weights(t, h)),
-                ),
-            })
-            .collect()
+                rgba: rgba(part),
+            }
+        };
+        slices.iter().map(piece).collect()
     }
 
     /// Area and centroid between two places along the edge, by Simpson's rule on each side of the

@@ -128,6 +128,21 @@ fn a_needle_of_aspect_a_million_stays_on_its_line() {
 }
 
 #[test]
+fn vertex_alpha_masks_piece_by_piece() {
+    // The left of the card is bare. Vertex alpha 0.9 leaves the right covered.
+    let half = texture(64, |x, _| [0, 200, 0, if x < 23 { 0 } else { 255 }]);
+    let mut soup = soup(Some(half), AlphaMode::Mask { cutoff: 0.5 });
+    let (plain, _) = surfels_of(&soup, SurfelSize::Units(0.05));
+    soup.colors = vec![[1.0, 1.0, 1.0, 0.9]; 3];
+    let (tinted, _) = surfels_of(&soup, SurfelSize::Units(0.05));
+    let covered = |s: &[Surfel]| s.iter().map(|s| f64::from(s.area * s.opacity)).sum::<f64>();
+    assert!(tinted.len() > 5, "{}", tinted.len());
+    assert!((covered(&tinted) / covered(&plain) - 1.0).abs() < 0.03);
+    // No black ghosts where the card is bare.
+    assert!(tinted.iter().all(|s| s.rgb[1] > 0.4 && s.position[0] > -0.25), "{tinted:?}");
+}
+
+#[test]
 fn vertex_colours_tint_and_vertex_alpha_moves_the_mask() {
     // Alpha ramps from 0 to 1 along u. With vertex alpha ½ the cutoff ½ passes nothing but the end.
     let ramp = texture(256, |x, _| [255, 255, 255, x as u8]);

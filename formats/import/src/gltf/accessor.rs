@@ -70,20 +70,9 @@ impl Reader<'_> {
             let problem = format!("indices of component type {:?}", component.0);
             return Err(self.source.invalid(element, problem));
         }
-        let mut out = Vec::new();
         // Every u32 is exact in an f64.
-        self.read(element, index, &[Type::Scalar], |mut v| {
-            out.push(v.next().unwrap_or(0.0) as u32)
-        })?;
-        Ok(out)
-    }
-
-    pub(crate) fn count(
-        &self,
-        element: &str,
-        index: Index<Accessor>,
-    ) -> Result<usize, ImportError> {
-        Ok(self.accessor(element, index)?.count.0 as usize)
+        let values = self.numbers::<1>(element, index, &[Type::Scalar], [0.0])?;
+        Ok(values.into_iter().map(|[v]| v as u32).collect())
     }
 
     fn accessor(&self, element: &str, index: Index<Accessor>) -> Result<&Accessor, ImportError> {
@@ -193,7 +182,7 @@ impl Reader<'_> {
 }
 
 /// Elements that an accessor without a view may have.
-const ZERO_LIMIT: usize = 1 << 26;
+const ZERO_LIMIT: usize = 1 << 22;
 
 impl Layout {
     fn check(&self, bytes: &[u8]) -> Result<(), String> {

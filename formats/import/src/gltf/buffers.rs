@@ -143,6 +143,11 @@ impl Packed {
             let (mode, count) = (&self.mode, self.count);
             return Err(bad(format!("byteStride {stride} and count {count} in mode {mode}")));
         }
+        // The codecs spend at least 2 bits on 16 values: more cannot come of these bytes.
+        let (size, most) = (self.count * stride, 256 * data.len() + 4096);
+        if size > most {
+            return Err(bad(format!("{} bytes cannot hold {size}; at most {most}", data.len())));
+        }
         let mut out = self.unpack(data).ok_or_else(|| {
             bad(format!("{} bytes do not decode in mode {}", data.len(), self.mode))
         })?;

@@ -114,6 +114,9 @@ fn split<'a>(source: &Source, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Vec<u
     if word(4) == Some(1) {
         return Err(source.unsupported("binary glTF version 1"));
     }
+    if word(8).is_none_or(|length| length < 20) {
+        return Err(source.invalid("glb container", "its header says less than 20 bytes"));
+    }
     gltf::binary::Glb::from_slice(bytes).map_err(|e| source.invalid("glb container", e))?;
     // The container is sound: the first chunk is the JSON.
     let length = word(12).unwrap_or(0);

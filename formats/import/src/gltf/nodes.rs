@@ -58,8 +58,16 @@ pub(crate) fn instances(
     let document: Document =
         serde_json::from_slice(json).map_err(|e| source.invalid("nodes", e))?;
     let mut skinned = 0;
-    let mut walk =
-        Walk { source, root, buffers, of_mesh, document, out: Vec::new(), skinned: &mut skinned };
+    let mut walk = Walk {
+        source,
+        root,
+        buffers,
+        of_mesh,
+        document,
+        out: Vec::new(),
+        skinned: &mut skinned,
+        visited: vec![false; root.nodes.len()],
+    };
     for node in walk.roots()? {
         walk.visit(node, Placement::IDENTITY, 0)?;
     }
@@ -78,6 +86,9 @@ struct Walk<'a> {
     document: Document,
     out: Vec<Instance>,
     skinned: &'a mut u32,
+    /// A glTF node has one parent: meeting one again is a fault, and would be a cycle or a tree of
+    /// exponential size.
+    visited: Vec<bool>,
 }
 
 impl Walk<'_> {
@@ -109,8 +120,11 @@ impl Walk<'_> {
         else {
             return Err(missing(self.source, "node tree", "node", index, count));
         };
+        if std::mem::replace(&mut self.visited[index], true) {
+            return Err(self.source.invalid(element, "it has two parents, or is its own ancestor"));
+        }
         if depth > MAX_DEPTH {
-            let problem = format!("more than {MAX_DEPTH} levels deep (is it its own ancestor?)");
+            let problem = format!("more than {MAX_DEPTH} levels deep");
             return Err(self.source.invalid(element, problem));
         }
         let placement = parent * transform.placement();

@@ -67,10 +67,15 @@ pub(crate) fn mesh(
         let kinds = [Type::Vec3, Type::Vec4];
         let colors = reader.numbers(element, accessor, &kinds, [1.0; 4])?;
         same_length("COLOR_0", colors.len())?;
-        mesh.colors = colors.iter().map(|c| c.map(|v| v as f32)).collect();
+        mesh.colors = colors.iter().map(|c| c.map(unit_range)).collect();
     }
     mesh.triangles = triangles(&reader, element, primitive.indices, *mode, count)?;
     Ok(Some(mesh))
+}
+
+/// Colours are within 0..1; what is no number counts as 1.
+fn unit_range(v: f64) -> f32 {
+    if v.is_nan() { 1.0 } else { v.clamp(0.0, 1.0) as f32 }
 }
 
 fn unit(n: [f64; 3]) -> Vec3 {
@@ -94,12 +99,7 @@ fn triangles(
 ) -> Result<Vec<[u32; 3]>, ImportError> {
     let invalid = |problem: String| reader.source.invalid(element, problem);
     let order: Vec<u32> = match indices {
-        Some(accessor) => {
-            let claimed = reader.count(element, accessor)?;
-            let order = reader.indices(element, accessor)?;
-            debug_assert_eq!(claimed, order.len());
-            order
-        }
+        Some(accessor) => reader.indices(element, accessor)?,
         None => (0..vertices as u32).collect(),
     };
     if let Some(at) = order.iter().position(|&v| v as usize >= vertices) {

@@ -373,7 +373,10 @@ fn broken_references_name_element_value_and_limit() {
     doc.refused(&["accessor 7 of 1"]);
     let mut doc = Doc::triangle();
     doc.json["nodes"][0]["children"] = json!([0]);
-    doc.refused(&["node 0", "levels deep"]);
+    doc.refused(&["node 0", "its own ancestor"]);
+    let mut doc = Doc::triangle();
+    doc.json["nodes"] = json!([{ "children": [1, 1] }, { "mesh": 0 }]);
+    doc.refused(&["node 1", "two parents"]);
     let mut doc = Doc::triangle();
     doc.primitive()["material"] = json!(3);
     doc.refused(&["material 3 of 0"]);

@@ -55,6 +55,49 @@ fn loose_edges_are_left_out() {
     assert_eq!((model.triangle_count(), model.meshes[0].uvs.len()), (1, 3));
 }
 
+/// Lines of a small OBJ and its MTL with words replaced: a model or an error, never a panic.
+#[test]
+fn mutated_words_never_panic() {
+    let obj = "mtllib t.mtl\no a\nv 0 0 0\nv 1 0 0\nv 0 1 0 0.5 0.5 0.5\nvn 0 0 1\nvt 0 0\nusemtl m\nf 1/1/1 2/1/1 3/1/1\ns 1\ng x\n";
+    let mtl = "newmtl m\nKd 1 1 1\nNs 2\nd 1\nTr 0\nillum 2\nNi 1\n";
+    let words = [
+        "",
+        "0",
+        "-1",
+        "1",
+        "1/",
+        "//",
+        "1//1",
+        "/1",
+        "-9",
+        "4",
+        "1e99",
+        "nan",
+        "f",
+        "x",
+        "9223372036854775807",
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    for (name, other, text) in [("t.obj", "t.mtl", obj), ("t.mtl", "t.obj", mtl)] {
+        write(dir.path(), other, if other == "t.obj" { obj } else { mtl });
+        let places: Vec<(usize, &str)> = text
+            .split_inclusive([' ', '\n'])
+            .scan(0, |at, w| {
+                *at += w.len();
+                Some((*at - w.len(), w))
+            })
+            .collect();
+        for (at, old) in places {
+            for word in words {
+                let end = at + old.trim_end().len();
+                write(dir.path(), name, &format!("{}{word}{}", &text[..at], &text[end..]));
+                let _ = load_file(&dir.path().join("t.obj"), &Limits::default())
+                    .map(|i| i.model.flatten(99));
+            }
+        }
+    }
+}
+
 #[test]
 fn alpha_comes_from_map_d_from_map_kd_or_from_tr() {
     let dir = tempfile::tempdir().unwrap();
