@@ -44,31 +44,21 @@
 //! assert_eq!(cut.points(&block).count(), 1); // far away, the strip is one point
 //! ```
 
-mod audit;
 mod bake;
 mod block;
-mod cell;
-mod cluster;
-mod frame;
-mod grid;
 mod header;
-mod lattice;
 mod materials;
-mod node;
 mod opacity;
 mod options;
-mod principal;
 pub mod record;
 mod select;
 mod size;
 pub mod spheroid;
-mod surfel;
-mod timing;
 mod triangle;
-mod union;
 mod validate;
 
-pub use audit::{CutAudit, audit};
+pub use bake::audit::{CutAudit, audit};
+pub use bake::timing::{StageTimes, Stopwatch};
 pub use bake::{BakeError, BakeReport, bake};
 pub use block::PointsBlock;
 pub use header::{BakeCounts, CellRecord, PointsHeader};
@@ -78,6 +68,5 @@ pub use options::{BakeOptions, GridChoice, Order, RadiusRule, SurfelSize};
 pub use record::PointRecord;
 pub use select::{CellCut, Cut, PixelArea, Thresholds, select, select_into};
 pub use size::SizeCode;
-pub use timing::{StageTimes, Stopwatch};
 pub use triangle::{TriangleRecord, UvRange, VertexRecord};
 pub use validate::validate;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::bake::bake;
+use crate::bake;
 use crate::options::{BakeOptions, GridChoice, RadiusRule, SurfelSize};
 use forest_pack::{Pack, PackWriter};
 use forest_soup::{Material, TriangleSoup};

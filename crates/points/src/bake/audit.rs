@@ -1,12 +1,12 @@
 //! What each radius rule and order keeps, level by level.
 
 use crate::bake::Preparation;
-use crate::cluster::{self, Leaves, Tree};
+use crate::bake::cluster::{self, Leaves, Tree};
+use crate::bake::surfel::SurfelMaker;
 use crate::header::BakeCounts;
 use crate::options::{BakeOptions, Order};
 use crate::size::SizeCode;
 use crate::spheroid;
-use crate::surfel::SurfelMaker;
 use forest_soup::TriangleSoup;
 use rayon::prelude::*;
 use std::ops::Range;

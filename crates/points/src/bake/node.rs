@@ -9,15 +9,15 @@
 //!   mean squared distance from the centroid, their own extents (r²/2 for a disc) included. So
 //!   r² = 4·σ²/(2 + f²). The opacity is what is left: covered area over footprint.
 //! * Covered area, under `Area`, is the sum over children. Under `Opacity` it is the mean, over all
-//!   view directions, of the projected *union*: measured ([`crate::union`]) once a few points have
+//!   view directions, of the projected *union*: measured ([`crate::bake::union`]) once a few points have
 //!   come together, and by a law of pairs ([`mean_overlap`]) below that.
 //! * `Paper`: section 4.2 of Gilet et al. 2005, spheres of radius
 //!   R = 2/π·(Rm + α·(RM − Rm)), RM = Rl + Rr, Rm = (Rl + Rr)/2, α = |Nl·Nr|.
 
+use crate::bake::surfel::{Surfel, axis_of};
 use crate::options::RadiusRule;
 use crate::size::SizeCode;
 use crate::spheroid;
-use crate::surfel::{Surfel, axis_of};
 use glam::DVec3;
 use std::f64::consts::PI;
 

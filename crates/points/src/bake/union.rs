@@ -1,13 +1,13 @@
 //! How much of each other a few points hide, measured.
 //!
-//! Pairs at a distance obey [`crate::node`]'s law, but leaves come in sprays, and two-sided leaves
+//! Pairs at a distance obey [`crate::bake::node`]'s law, but leaves come in sprays, and two-sided leaves
 //! as two coincident sheets: what they hide of each other is many times what independent ones
 //! would. So whenever a subtree has gathered a few points that were not looked at together, their
 //! union is sampled: from directions in turn, a sample on each point counts as much of its area as
 //! the points before it leave open. That is the area of the union *as renderers draw it*, with
 //! opacity as independent cover; the subtree then stands for one point with that covered area.
 
-use crate::node::Node;
+use crate::bake::node::Node;
 use crate::spheroid;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
@@ -122,8 +122,8 @@ fn plane_sequence(k: u32) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bake::surfel::Surfel;
     use crate::options::RadiusRule;
-    use crate::surfel::Surfel;
 
     fn leaf(at: [f32; 3], axis: DVec3) -> Node {
         let s = Surfel {

@@ -1,16 +1,17 @@
 //! Bakes one cell: triangles in, sorted records out.
 
-use crate::cluster::{self, ClusterRules, Leaves, Tree};
-use crate::frame::BlockFrame;
+use crate::bake::cluster::{self, ClusterRules, Leaves, Tree};
+use crate::bake::encode::{TriangleColors, TriangleEncoder};
+use crate::bake::frame::BlockFrame;
+use crate::bake::lattice::{Lattice, Quantiser};
+use crate::bake::node::Node;
+use crate::bake::surfel::{Outcome, Surfel, SurfelMaker};
+use crate::bake::timing::StageTimes;
 use crate::header::BakeCounts;
-use crate::lattice::{Lattice, Quantiser};
-use crate::node::Node;
 use crate::options::{BakeOptions, Order};
 use crate::record::PointRecord;
 use crate::size::SizeCode;
-use crate::surfel::{Outcome, Surfel, SurfelMaker};
-use crate::timing::StageTimes;
-use crate::triangle::{TriangleColors, TriangleEncoder, TriangleRecord};
+use crate::triangle::TriangleRecord;
 use forest_soup::{Bounds, TriangleSoup};
 use hashbrown::HashTable;
 use hashbrown::hash_table::Entry;

@@ -1,6 +1,6 @@
 //! The regular grid over a block (Gilet et al. 2005, section 4.1).
 
-use crate::frame::BlockFrame;
+use crate::bake::frame::BlockFrame;
 use crate::options::GridChoice;
 use forest_soup::{Bounds, TriangleSoup};
 use glam::DVec3;

@@ -11,7 +11,7 @@
 mod slices;
 
 use self::slices::Slices;
-use crate::frame::BlockFrame;
+use crate::bake::frame::BlockFrame;
 use crate::options::{BakeOptions, SurfelSize};
 use forest_soup::{AlphaMode, Material, ShadedTexture, TriangleSoup};
 use glam::{DVec3, Vec2};

@@ -4,14 +4,14 @@
 //! eigenvector, until fewer than five surfels are left. Every node becomes a point; the records of
 //! a tree lie in post-order, children before their parent.
 
-use crate::lattice::Quantiser;
-use crate::node::Node;
+use crate::bake::lattice::Quantiser;
+use crate::bake::node::Node;
+use crate::bake::principal::{Moments, principal_axis};
+use crate::bake::surfel::Surfel;
+use crate::bake::union;
 use crate::options::RadiusRule;
-use crate::principal::{Moments, principal_axis};
 use crate::record::PointRecord;
 use crate::size::SizeCode;
-use crate::surfel::Surfel;
-use crate::union;
 use glam::DVec3;
 
 /// Clusters of at most this many surfels are not split ("until fewer than 5").

@@ -1,18 +1,31 @@
 //! The bake: soup → sections of a pack, cell by cell.
 
-use crate::cell::{self, BakedCell, CellBaker};
-use crate::cluster::{self, Leaves};
-use crate::frame::BlockFrame;
-use crate::grid::CellLists;
+pub(crate) mod audit;
+mod cell;
+mod cluster;
+mod encode;
+mod frame;
+mod grid;
+mod lattice;
+mod node;
+mod principal;
+mod surfel;
+pub(crate) mod timing;
+mod union;
+
+use crate::bake::cell::{BakedCell, CellBaker};
+use crate::bake::cluster::Leaves;
+use crate::bake::encode::TriangleEncoder;
+use crate::bake::frame::BlockFrame;
+use crate::bake::grid::CellLists;
+use crate::bake::lattice::Lattice;
+use crate::bake::node::Node;
+use crate::bake::surfel::{SurfelMaker, SurfelShader};
+use crate::bake::timing::StageTimes;
 use crate::header::{BakeCounts, CellRecord, PointsHeader};
-use crate::lattice::Lattice;
 use crate::materials::write_materials;
-use crate::node::Node;
 use crate::options::{BakeOptions, Order};
 use crate::size::SizeCode;
-use crate::surfel::{SurfelMaker, SurfelShader};
-use crate::timing::StageTimes;
-use crate::triangle::TriangleEncoder;
 use forest_pack::{Codec, PackError, PackWriter, SectionId, Spool, header, kind};
 use forest_soup::{Bounds, InvalidSoup, TriangleSoup};
 use rayon::prelude::*;

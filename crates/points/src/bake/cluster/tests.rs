@@ -1,5 +1,5 @@
 use super::*;
-use crate::lattice::Lattice;
+use crate::bake::lattice::Lattice;
 use forest_soup::Bounds;
 use proptest::prelude::*;
 
