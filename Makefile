@@ -80,8 +80,9 @@ samples: setup
 
 fuzz: setup
 	@command -v cargo-fuzz >/dev/null || $(CARGO) install cargo-fuzz --locked
-	cd tests/fuzz && for target in container sections; do \
-	  RUSTC_BOOTSTRAP=1 cargo fuzz run -s none $$target -- -max_total_time=$(T) -max_len=65536 || exit 1; done
+	cd tests/fuzz && for target in container sections; do mkdir -p found/$$target; \
+	  RUSTC_BOOTSTRAP=1 cargo fuzz run -s none $$target found/$$target corpus/$$target -- \
+	    -max_total_time=$(T) -max_len=65536 || exit 1; done
 
 deny:
 	@command -v cargo-deny >/dev/null || { echo "cargo install cargo-deny --locked"; exit 1; }
