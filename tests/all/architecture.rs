@@ -21,7 +21,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-pack", &[]),
     ("forest-import", &["forest-soup"]),
     ("forest-points", &["forest-soup", "forest-pack"]),
-    ("forest-draw", &["forest-soup", "forest-points"]),
+    ("forest-draw", &["forest-soup", "forest-pack", "forest-points"]),
     ("forest-sample-data", &["forest-soup"]),
     (
         "forest-bake",

@@ -7,8 +7,7 @@ use forest_draw::{Style, Surfaces, draw_points};
 use forest_pack::header::{self, Meta};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::{
-    BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, read_materials,
-    select,
+    BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, select,
 };
 use forest_soup::{Camera, Projection, TriangleSoup};
 use glam::DVec3;
@@ -50,12 +49,7 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
     let block = PointsBlock::open(&pack)?;
-    let surfaces = if block.triangles.is_empty() {
-        None
-    } else {
-        let (materials, textures) = read_materials(&pack)?;
-        Some(Surfaces::new(&materials, &textures))
-    };
+    let surfaces = Surfaces::read(&pack, &block)?;
     let projection = Projection::Perspective { fov_y: 1.0 };
     let mut drawn = 0;
     for distance in [0.0, 1.0, 1e4] {

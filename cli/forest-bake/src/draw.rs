@@ -4,7 +4,7 @@ use crate::failure::Usage;
 use anyhow::{Context, Result};
 use forest_draw::{Light, Picture, Style, Surfaces, draw_points};
 use forest_pack::Pack;
-use forest_points::{PixelArea, PointsBlock, Thresholds, read_materials};
+use forest_points::{PixelArea, PointsBlock, Thresholds};
 use forest_soup::{Camera, Projection};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
@@ -68,12 +68,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     }
     let pack = Pack::open(&args.pack)?;
     let block = PointsBlock::open(&pack)?;
-    let surfaces = if block.triangles.is_empty() {
-        None
-    } else {
-        let (materials, textures) = read_materials(&pack)?;
-        Some(Surfaces::new(&materials, &textures))
-    };
+    let surfaces = Surfaces::read(&pack, &block)?;
     let camera = args.camera(&block)?;
     let light = match args.light {
         LightArg::Albedo => Light::Albedo,

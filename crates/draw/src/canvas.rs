@@ -1,7 +1,7 @@
 //! The sample buffer: depth-tested, filled in horizontal bands by all threads.
 
 use crate::picture::Picture;
-use crate::primitive::{Ellipse, Primitive, Triangle};
+use crate::primitive::{Primitive, Splat, Triangle};
 use crate::style::Style;
 use forest_points::covers;
 use forest_soup::Camera;
@@ -70,7 +70,7 @@ impl Canvas {
                 let mut band = Band::new(self, b * BAND, rows);
                 for &i in list {
                     match &primitives[i as usize] {
-                        Primitive::Ellipse(e) => band.ellipse(e),
+                        Primitive::Splat(s) => band.splat(s),
                         Primitive::Triangle(t) => band.triangle(t),
                     }
                 }
@@ -85,9 +85,9 @@ impl Primitive<'_> {
     /// Topmost and bottommost row of samples it may touch.
     fn rows(&self) -> (f64, f64) {
         match self {
-            Primitive::Ellipse(e) => {
-                let half = e.half_size().y;
-                (e.center.y - half, e.center.y + half)
+            Primitive::Splat(s) => {
+                let (middle, half) = (s.footprint.center.y, s.footprint.half_size().y);
+                (middle - half, middle + half)
             }
             Primitive::Triangle(t) => {
                 let y = t.corners.map(|c| c.y);
@@ -127,12 +127,11 @@ impl Band {
         }
     }
 
-    fn ellipse(&mut self, e: &Ellipse) {
-        let half = e.half_size();
-        let depth = e.depth as f32;
-        self.visit(e.center - half, e.center + half, |p, x, y, sample| {
-            if depth < sample.depth && e.contains(p) && covers(e.id, x, y, e.opacity) {
-                *sample = Sample { depth, rgb: e.rgb };
+    fn splat(&mut self, s: &Splat) {
+        let (f, half, depth) = (s.footprint, s.footprint.half_size(), s.depth as f32);
+        self.visit(f.center - half, f.center + half, |p, x, y, sample| {
+            if depth < sample.depth && f.contains(p) && covers(s.id, x, y, s.opacity) {
+                *sample = Sample { depth, rgb: s.rgb };
             }
         });
     }

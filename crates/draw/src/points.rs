@@ -2,12 +2,14 @@
 
 use crate::canvas::Canvas;
 use crate::picture::Picture;
-use crate::primitive::{Ellipse, Primitive, Surface, Triangle};
+use crate::primitive::{Primitive, Splat, Surface, Triangle};
 use crate::style::Style;
+use forest_pack::{Pack, PackError};
 use forest_points::record::decode_axis;
+use forest_points::spheroid::Footprint;
 use forest_points::{
-    CellRecord, Cut, PointRecord, PointsBlock, Thresholds, TriangleRecord, VertexRecord, select,
-    spheroid,
+    CellRecord, Cut, PointRecord, PointsBlock, Thresholds, TriangleRecord, VertexRecord,
+    read_materials, select,
 };
 use forest_soup::{Camera, Material, Projection, Texture, srgb8_to_linear};
 use glam::{DVec2, DVec3, Vec2};
@@ -18,6 +20,18 @@ use std::sync::Arc;
 pub struct Surfaces(Vec<Surface>);
 
 impl Surfaces {
+    /// The surfaces of a pack, `None` if its block has no triangles to draw them on.
+    ///
+    /// # Errors
+    /// When the materials or textures are missing, damaged or break a rule.
+    pub fn read(pack: &Pack, block: &PointsBlock) -> Result<Option<Self>, PackError> {
+        if block.triangles.is_empty() {
+            return Ok(None);
+        }
+        let (materials, textures) = read_materials(pack)?;
+        Ok(Some(Self::new(&materials, &textures)))
+    }
+
     /// Prepares the materials of [`forest_points::read_materials`].
     pub fn new(materials: &[Material], textures: &[Arc<Texture>]) -> Self {
         Self(materials.iter().map(|m| Surface::new(m, textures)).collect())
@@ -51,7 +65,7 @@ pub fn draw_points(
     let projector = Projector { block, camera, style, scale: canvas.scale() };
     let mut primitives: Vec<Primitive> = cut
         .points(block)
-        .filter_map(|(id, cell, p)| projector.point(id, cell, p).map(Primitive::Ellipse))
+        .filter_map(|(id, cell, p)| projector.point(id, cell, p).map(Primitive::Splat))
         .collect();
     if let Some(surfaces) = surfaces {
         projector.triangles(&cut, surfaces, &mut primitives);
@@ -67,30 +81,24 @@ struct Projector<'a> {
     scale: f64,
 }
 
-/// Ellipses thinner than this share of their length are drawn with it: a disc seen edge-on.
-const THINNEST: f64 = 1e-3;
-
 impl Projector<'_> {
-    fn point(&self, id: u32, cell: &CellRecord, p: &PointRecord) -> Option<Ellipse> {
+    fn point(&self, id: u32, cell: &CellRecord, p: &PointRecord) -> Option<Splat> {
         let world = self.block.to_world(self.block.position(cell, p.position));
         let (x, y, depth) = self.camera.project(world);
         if self.is_behind(depth) {
             return None;
         }
         let pixels = self.camera.pixels_per_unit(depth);
-        let axis = p.axis();
-        let to_eye = self.camera.to_eye(world);
-        let ratio =
-            spheroid::footprint_ratio(spheroid::flatness(p.flatness_step()), axis.dot(to_eye));
-        // The disc is foreshortened along the projection of its axis; y points down.
-        let minor = DVec2::new(axis.dot(self.camera.right), -axis.dot(self.camera.up));
+        let (axis, camera) = (p.axis(), self.camera);
+        let center = DVec2::new(x, y) * self.scale;
+        let radius = p.own().radius() * self.block.scale() * pixels * self.scale;
+        // y points down in a picture.
+        let plane = [camera.right, -camera.up];
+        let to_eye = camera.to_eye(world);
         let light = self.style.light.factor(axis);
-        Some(Ellipse {
+        Some(Splat {
             id,
-            center: DVec2::new(x, y) * self.scale,
-            radius: p.own().radius() * self.block.scale() * pixels * self.scale,
-            minor: minor.normalize_or(DVec2::X),
-            ratio: ratio.max(THINNEST),
+            footprint: Footprint::new(center, radius, p.flatness_step(), axis, to_eye, plane),
             depth,
             opacity: p.opacity,
             rgb: p.color().map(|v| v * light),

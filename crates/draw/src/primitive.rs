@@ -1,48 +1,27 @@
-//! What the canvas draws: ellipses and textured triangles, in sample coordinates.
+//! What the canvas draws: splats and textured triangles, in sample coordinates.
 
 use forest_points::covers;
+use forest_points::spheroid::Footprint;
 use forest_soup::{AlphaMode, Material, ShadedTexture, Texture};
 use glam::{DVec2, Vec2};
 
 /// Something to draw. Coordinates count samples from the picture's top left corner.
 #[derive(Clone, Debug)]
 pub(crate) enum Primitive<'a> {
-    /// A point's footprint.
-    Ellipse(Ellipse),
+    /// A point.
+    Splat(Splat),
     /// A triangle of the source.
     Triangle(Box<Triangle<'a>>),
 }
 
-/// The footprint of a spheroid.
+/// A point as it is drawn.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ellipse {
+pub(crate) struct Splat {
     pub(crate) id: u32,
-    pub(crate) center: DVec2,
-    /// Larger semi-axis.
-    pub(crate) radius: f64,
-    /// Unit direction of the smaller semi-axis.
-    pub(crate) minor: DVec2,
-    /// Smaller over larger semi-axis, > 0.
-    pub(crate) ratio: f64,
+    pub(crate) footprint: Footprint,
     pub(crate) depth: f64,
     pub(crate) opacity: u8,
     pub(crate) rgb: [f32; 3],
-}
-
-impl Ellipse {
-    /// Half the height and width of the box around the ellipse.
-    pub(crate) fn half_size(&self) -> DVec2 {
-        let flat = 1.0 - self.ratio * self.ratio;
-        let extent = |m: f64| self.radius * (1.0 - m * m * flat).max(0.0).sqrt();
-        DVec2::new(extent(self.minor.x), extent(self.minor.y))
-    }
-
-    pub(crate) fn contains(&self, p: DVec2) -> bool {
-        let d = p - self.center;
-        let along = d.dot(self.minor);
-        let squeezed = d.length_squared() + along * along * (1.0 / (self.ratio * self.ratio) - 1.0);
-        squeezed <= self.radius * self.radius
-    }
 }
 
 /// A projected triangle.

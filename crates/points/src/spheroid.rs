@@ -8,6 +8,7 @@
 //! direction*, and A/2 on average (Cauchy). A sphere of the paper's kind would need √(A/2π) and
 //! be right on average only.
 
+use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
@@ -72,6 +73,57 @@ pub fn mean_projected_area(r: f64, k: u8, o: f64) -> f64 {
     PI * r * r * mean_ratio_of_step(k) * o
 }
 
+/// The ellipse that a spheroid covers in a picture plane: what renderers fill, and what the baker
+/// measures unions with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Middle, in the plane's coordinates.
+    pub center: DVec2,
+    /// Larger semi-axis.
+    pub radius: f64,
+    /// Unit direction of the smaller semi-axis.
+    pub minor: DVec2,
+    /// Smaller over larger semi-axis, > 0.
+    pub ratio: f64,
+}
+
+/// A disc seen edge-on still has this ratio: dividing by it must not overflow.
+const THINNEST: f64 = 1e-6;
+
+impl Footprint {
+    /// Of a spheroid of quantised flatness `step` about unit vector `axis`, seen from unit direction
+    /// `to_eye`; `x` and `y` are the unit vectors of the plane.
+    pub fn new(
+        center: DVec2,
+        radius: f64,
+        step: u8,
+        axis: DVec3,
+        to_eye: DVec3,
+        [x, y]: [DVec3; 2],
+    ) -> Self {
+        // The disc is foreshortened along the projection of its axis.
+        let minor = DVec2::new(axis.dot(x), axis.dot(y)).normalize_or(DVec2::X);
+        let ratio = footprint_ratio(flatness(step), axis.dot(to_eye)).max(THINNEST);
+        Self { center, radius, minor, ratio }
+    }
+
+    /// Whether the ellipse contains `p`.
+    #[inline]
+    pub fn contains(&self, p: DVec2) -> bool {
+        let d = p - self.center;
+        let along = d.dot(self.minor);
+        d.length_squared() + along * along * (1.0 / (self.ratio * self.ratio) - 1.0)
+            <= self.radius * self.radius
+    }
+
+    /// Half the width and height of the box around the ellipse.
+    pub fn half_size(&self) -> DVec2 {
+        let flat = 1.0 - self.ratio * self.ratio;
+        let extent = |m: f64| self.radius * (1.0 - m * m * flat).max(0.0).sqrt();
+        DVec2::new(extent(self.minor.x), extent(self.minor.y))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,6 +137,26 @@ mod tests {
                 (0..n).map(|i| footprint_ratio(f, (f64::from(i) + 0.5) / f64::from(n))).sum();
             assert!((sum / f64::from(n) - mean_ratio(f)).abs() < 1e-8, "{f}");
         }
+    }
+
+    #[test]
+    fn a_footprint_fills_its_box_and_covers_its_area() {
+        let axis = DVec3::new(0.4, -0.3, 0.866).normalize();
+        let f = Footprint::new(DVec2::ZERO, 2.0, 30, axis, DVec3::Z, [DVec3::X, DVec3::Y]);
+        let (half, n, mut inside) = (f.half_size(), 1000, 0);
+        let mut reach = DVec2::ZERO;
+        for i in 0..n * n {
+            let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n) * 5.0 - 2.5;
+            let p = DVec2::new(at(i % n), at(i / n));
+            if f.contains(p) {
+                inside += 1;
+                reach = reach.max(p.abs());
+            }
+        }
+        let area = f64::from(inside) * 25.0 / f64::from(n * n);
+        let want = PI * 4.0 * footprint_ratio(flatness(30), axis.z);
+        assert!((area / want - 1.0).abs() < 1e-3, "{area} {want}");
+        assert!((reach - half).abs().max_element() < 0.02, "{reach} {half}");
     }
 
     #[test]

@@ -3,9 +3,7 @@
 use anyhow::Result;
 use forest_draw::{Light, Style, Surfaces, draw_points};
 use forest_pack::{Pack, PackWriter};
-use forest_points::{
-    BakeOptions, PixelArea, PointsBlock, RadiusRule, Thresholds, bake, read_materials,
-};
+use forest_points::{BakeOptions, PixelArea, PointsBlock, RadiusRule, Thresholds, bake};
 use forest_soup::{Camera, Projection, TriangleSoup};
 use glam::DVec3;
 
@@ -37,8 +35,7 @@ pub(crate) fn measure(soup: &TriangleSoup, radius: RadiusRule) -> Result<Vec<Row
     writer.finish()?;
     let pack = Pack::open(&path)?;
     let block = PointsBlock::open(&pack)?;
-    let (materials, textures) = read_materials(&pack)?;
-    let surfaces = Surfaces::new(&materials, &textures);
+    let surfaces = Surfaces::read(&pack, &block)?;
     let style = Style { samples: SAMPLES, light: Light::Albedo };
     let draw = |camera: &Camera, finest: f64, largest: f64| {
         let thresholds = Thresholds {
@@ -46,7 +43,7 @@ pub(crate) fn measure(soup: &TriangleSoup, radius: RadiusRule) -> Result<Vec<Row
             largest: PixelArea(largest),
             depth_bias: PixelArea(0.0),
         };
-        let (picture, drawn) = draw_points(&block, Some(&surfaces), camera, &thresholds, &style);
+        let (picture, drawn) = draw_points(&block, surfaces.as_ref(), camera, &thresholds, &style);
         (picture.mean_coverage(), drawn.points)
     };
     let mut rows = vec![Row { points: 0, error: 0.0, worst: 0.0 }; CUTS.len()];

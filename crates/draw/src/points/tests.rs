@@ -43,7 +43,7 @@ fn baked(soup: &TriangleSoup, size: f64) -> Pack {
 
 fn picture(pack: &Pack, forward: DVec3, largest: f64, projection: Projection) -> (Picture, Drawn) {
     let block = PointsBlock::open(pack).unwrap();
-    let (materials, textures) = forest_points::read_materials(pack).unwrap();
+    let (materials, textures) = read_materials(pack).unwrap();
     let surfaces = Surfaces::new(&materials, &textures);
     let eye = DVec3::new(0.5, 0.5, 0.0) - forward * 2.0;
     let camera = Camera::new(eye, forward, projection, [64, 64]);
@@ -103,7 +103,7 @@ fn an_eye_inside_the_block_clips_what_is_behind_it() {
     }
     let pack = baked(&soup, 0.5);
     let block = PointsBlock::open(&pack).unwrap();
-    let (materials, textures) = forest_points::read_materials(&pack).unwrap();
+    let (materials, textures) = read_materials(&pack).unwrap();
     let surfaces = Surfaces::new(&materials, &textures);
     let projection = Projection::Perspective { fov_y: 1.0 };
     let camera = Camera::new(DVec3::new(0.5, 0.5, 0.0), -DVec3::Z, projection, [32, 32]);

@@ -8,7 +8,7 @@
 //! opacity as independent cover; the subtree then stands for one point with that covered area.
 
 use crate::bake::node::Node;
-use crate::spheroid;
+use crate::spheroid::Footprint;
 use glam::{DVec2, DVec3};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
@@ -21,38 +21,32 @@ const DIRECTIONS: u32 = 4;
 
 /// A point as seen from a direction.
 struct Seen {
-    center: DVec2,
-    radius: f64,
-    minor: DVec2,
-    ratio: f64,
+    footprint: Footprint,
     opacity: f64,
 }
 
 impl Seen {
     fn of(node: &Node, v: DVec3, right: DVec3, up: DVec3) -> Self {
-        let cos = node.axis.dot(v);
-        let ratio = spheroid::footprint_ratio(spheroid::flatness(node.flatness), cos);
-        let minor = DVec2::new(node.axis.dot(right), node.axis.dot(up));
-        Self {
-            center: DVec2::new(node.center.dot(right), node.center.dot(up)),
-            radius: node.own.radius(),
-            minor: minor.normalize_or(DVec2::X),
-            ratio: ratio.max(1e-6),
-            opacity: node.cover(),
-        }
+        let center = DVec2::new(node.center.dot(right), node.center.dot(up));
+        let (radius, step) = (node.own.radius(), node.flatness);
+        let footprint = Footprint::new(center, radius, step, node.axis, v, [right, up]);
+        Self { footprint, opacity: node.cover() }
+    }
+
+    /// Covered area, over π.
+    fn area(&self) -> f64 {
+        self.footprint.radius * self.footprint.radius * self.footprint.ratio * self.opacity
     }
 
     /// The point of the ellipse at point `d` of the unit disc.
     fn sample(&self, d: DVec2) -> DVec2 {
-        let d = d * self.radius;
-        self.center + self.minor * (d.x * self.ratio) + self.minor.perp() * d.y
+        let Footprint { center, radius, minor, ratio } = self.footprint;
+        let d = d * radius;
+        center + minor * (d.x * ratio) + minor.perp() * d.y
     }
 
     fn contains(&self, p: DVec2) -> bool {
-        let d = p - self.center;
-        let along = d.dot(self.minor);
-        d.length_squared() + along * along * (1.0 / (self.ratio * self.ratio) - 1.0)
-            <= self.radius * self.radius
+        self.footprint.contains(p)
     }
 }
 
@@ -67,7 +61,7 @@ pub(crate) fn covered(nodes: &[Node], seed: u32) -> f64 {
         seen.clear();
         for (i, node) in (0u32..).zip(nodes) {
             let this = Seen::of(node, v, right, up);
-            let area = this.radius * this.radius * this.ratio * this.opacity;
+            let area = this.area();
             let sample = seed.wrapping_add(i * DIRECTIONS + k) % TABLE;
             let p = this.sample(SAMPLES[sample as usize]);
             let left: f64 =

@@ -178,7 +178,8 @@ fn select_into_keeps_its_memory() {
 }
 
 proptest! {
-    /// Colour coding: every triangle of one cell is drawn, as itself or under exactly one point.
+    /// Across cells, by area: what is drawn as triangles and points adds up to the block. (That each
+    /// surfel is represented exactly once within its cell is audited in `bake::audit`.)
     #[test]
     fn thresholds_of_any_size_give_a_cut(
         finest in 0.0f64..100.0, ratio in 1.0f64..50.0, k in -50.0f64..50.0, d in 0.5f64..100.0,
