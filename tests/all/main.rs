@@ -5,6 +5,7 @@ mod blocks; // several trees baked together
 mod cli; // the program: usage, exit codes, what it prints, what it leaves behind
 mod fuzz_corpus; // inputs that fuzzing found or started from
 mod goldens; // committed packs: read, damaged, baked again
+mod ground_truth; // the pictures that packs are judged against: two ways, and another's
 mod hard_cases; // degenerate and extreme soups, each with its expected number
 mod invariance; // threads, places and scales that must not matter
 mod real_trees; // trees by others, where they are present

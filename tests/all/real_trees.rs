@@ -1,17 +1,10 @@
 //! Trees by others: in ../shared/trees beside the checkout, where they are.
 
-use crate::support::{arg, inspect, repo, succeed};
-use std::io::Write;
+use crate::support::{arg, inspect, shared, succeed};
 use std::path::PathBuf;
 
 fn tree(name: &str) -> Option<PathBuf> {
-    let path = repo("../shared/trees").join(name);
-    if !path.exists() {
-        // Past the harness, which keeps to itself what a passing test prints.
-        let _ = writeln!(std::io::stderr(), "skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+    shared("trees").map(|t| t.join(name))
 }
 
 /// Bakes and verifies; returns the counts of `inspect`.

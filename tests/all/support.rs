@@ -1,6 +1,7 @@
 //! Running the shipped program.
 
 use assert_cmd::Command;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
@@ -39,6 +40,17 @@ pub(crate) fn succeed(args: &[&str]) -> String {
 /// A file of this repository.
 pub(crate) fn repo(relative: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(relative)
+}
+
+/// A folder of ../shared beside the checkout, where it is; else says that something is skipped.
+pub(crate) fn shared(folder: &str) -> Option<PathBuf> {
+    let path = repo("../shared").join(folder);
+    if path.exists() {
+        return Some(path);
+    }
+    // Past the harness, which keeps to itself what a passing test prints.
+    let _ = writeln!(std::io::stderr(), "skipped: {} is not there", path.display());
+    None
 }
 
 /// A path as an argument.

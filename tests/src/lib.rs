@@ -3,12 +3,13 @@
 pub mod golden;
 pub mod soups;
 
-use forest_draw::{Style, Surfaces, draw_points};
+use forest_draw::{draw_points, read_surfaces};
 use forest_pack::header::{self, Meta};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::{
     BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, select,
 };
+use forest_raster::{Sampling, Style};
 use forest_soup::{Camera, Projection, TriangleSoup};
 use glam::DVec3;
 use std::path::Path;
@@ -49,7 +50,7 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
     let block = PointsBlock::open(&pack)?;
-    let surfaces = Surfaces::read(&pack, &block)?;
+    let surfaces = read_surfaces(&pack, &block)?;
     let projection = Projection::Perspective { fov_y: 1.0 };
     let mut drawn = 0;
     for distance in [0.0, 1.0, 1e4] {
@@ -59,7 +60,7 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         let cut = select(&block, &camera, &thresholds);
         drawn += cut.points(&block).count() + cut.triangle_count() as usize;
         let small = Camera { width: 16, height: 16, ..camera };
-        let style = Style { samples: 1, ..Style::default() };
+        let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
         draw_points(&block, surfaces.as_ref(), &small, &thresholds, &style);
     }
     Ok(drawn)

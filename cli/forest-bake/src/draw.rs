@@ -2,9 +2,10 @@
 
 use crate::failure::Usage;
 use anyhow::{Context, Result};
-use forest_draw::{Light, Picture, Style, Surfaces, draw_points};
+use forest_draw::{draw_points, read_surfaces};
 use forest_pack::Pack;
 use forest_points::{PixelArea, PointsBlock, Thresholds};
+use forest_raster::{Light, Picture, Sampling, Style};
 use forest_soup::{Camera, Projection};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
@@ -68,13 +69,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     }
     let pack = Pack::open(&args.pack)?;
     let block = PointsBlock::open(&pack)?;
-    let surfaces = Surfaces::read(&pack, &block)?;
+    let surfaces = read_surfaces(&pack, &block)?;
     let camera = args.camera(&block)?;
     let light = match args.light {
         LightArg::Albedo => Light::Albedo,
         LightArg::Sun => Light::MORNING,
     };
-    let style = Style { samples: args.samples, light };
+    let style = Style { sampling: Sampling { side: args.samples, seed: 1 }, light };
     let mut pictures = Vec::new();
     for &finest in &args.finest {
         let thresholds = Thresholds {

@@ -1,14 +1,13 @@
 //! Packs to pictures on the CPU: what a viewer draws, without a viewer.
 //!
-//! [`draw_points`] draws the cut that [`forest_points::select()`] chooses: spheroids as ellipses,
-//! triangles with their textures and alpha rule, opacity by the hash rule, no sorting and no
-//! blending. A picture is supersampled on a regular grid of `samples²` a pixel and box-filtered;
-//! textures are sampled bilinearly at full resolution, so that a far leaf card keeps its mean
-//! alpha.
+//! [`draw_points`] draws the cut that [`forest_points::select()`] chooses on the canvas of
+//! [`forest_raster`], with the same samples as the ground truth: spheroids as ellipses, triangles
+//! with their textures and alpha rule, opacity by the hash rule, no sorting and no blending.
 //!
 //! ```
-//! use forest_draw::{Light, Style, draw_points};
+//! use forest_draw::draw_points;
 //! use forest_points::{BakeOptions, PointsBlock, SurfelSize, Thresholds, bake};
+//! use forest_raster::Style;
 //! use forest_soup::{Camera, Material, Projection, TriangleSoup};
 //! use glam::{DVec3, Vec3};
 //!
@@ -29,18 +28,11 @@
 //! let block = PointsBlock::open(&pack).unwrap();
 //! let projection = Projection::Orthographic { height: 2.0 };
 //! let camera = Camera::new(DVec3::new(0.5, 0.5, 1.0), -DVec3::Z, projection, [64, 64]);
-//! let style = Style { samples: 4, light: Light::Albedo };
 //! // One disc of the leaf's area, half a unit, in a picture of four.
-//! let (picture, _) = draw_points(&block, None, &camera, &Thresholds::default(), &style);
+//! let (picture, _) = draw_points(&block, None, &camera, &Thresholds::default(), &Style::default());
 //! assert!((picture.mean_coverage() - 0.125).abs() < 0.01);
 //! ```
 
-mod canvas;
-mod picture;
 mod points;
-mod primitive;
-mod style;
 
-pub use picture::Picture;
-pub use points::{Drawn, Surfaces, draw_points};
-pub use style::{Light, Style};
+pub use points::{Drawn, draw_points, point_ellipses, read_surfaces};

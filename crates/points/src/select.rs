@@ -74,6 +74,17 @@ impl CellCut {
             Order::Paper => true,
         }
     }
+
+    /// The drawn points: index in the block, cell and record.
+    pub fn drawn_points<'a>(
+        &'a self,
+        block: &'a PointsBlock<'a>,
+    ) -> impl Iterator<Item = (u32, &'a CellRecord, &'a PointRecord)> {
+        let cell = &block.cells[self.cell as usize];
+        let records = &block.points[self.points.start as usize..self.points.end as usize];
+        let drawn = self.points.clone().zip(records).filter(|(_, p)| self.draws(p));
+        drawn.map(move |(i, p)| (i, cell, p))
+    }
 }
 
 /// What to draw of a block.
@@ -89,12 +100,7 @@ impl Cut {
         &'a self,
         block: &'a PointsBlock<'a>,
     ) -> impl Iterator<Item = (u32, &'a CellRecord, &'a PointRecord)> {
-        self.cells.iter().flat_map(move |c| {
-            let cell = &block.cells[c.cell as usize];
-            let records = &block.points[c.points.start as usize..c.points.end as usize];
-            let drawn = (c.points.clone()).zip(records).filter(|(_, p)| c.draws(p));
-            drawn.map(move |(i, p)| (i, cell, p))
-        })
+        self.cells.iter().flat_map(|c| c.drawn_points(block))
     }
 
     /// Number of triangles to draw.

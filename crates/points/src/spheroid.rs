@@ -115,13 +115,6 @@ impl Footprint {
         d.length_squared() + along * along * (1.0 / (self.ratio * self.ratio) - 1.0)
             <= self.radius * self.radius
     }
-
-    /// Half the width and height of the box around the ellipse.
-    pub fn half_size(&self) -> DVec2 {
-        let flat = 1.0 - self.ratio * self.ratio;
-        let extent = |m: f64| self.radius * (1.0 - m * m * flat).max(0.0).sqrt();
-        DVec2::new(extent(self.minor.x), extent(self.minor.y))
-    }
 }
 
 #[cfg(test)]
@@ -140,23 +133,18 @@ mod tests {
     }
 
     #[test]
-    fn a_footprint_fills_its_box_and_covers_its_area() {
+    fn a_footprint_covers_its_area() {
         let axis = DVec3::new(0.4, -0.3, 0.866).normalize();
         let f = Footprint::new(DVec2::ZERO, 2.0, 30, axis, DVec3::Z, [DVec3::X, DVec3::Y]);
-        let (half, n, mut inside) = (f.half_size(), 1000, 0);
-        let mut reach = DVec2::ZERO;
+        let (n, mut inside) = (1000, 0);
         for i in 0..n * n {
             let at = |i: i32| (f64::from(i) + 0.5) / f64::from(n) * 5.0 - 2.5;
             let p = DVec2::new(at(i % n), at(i / n));
-            if f.contains(p) {
-                inside += 1;
-                reach = reach.max(p.abs());
-            }
+            inside += i32::from(f.contains(p));
         }
         let area = f64::from(inside) * 25.0 / f64::from(n * n);
         let want = PI * 4.0 * footprint_ratio(flatness(30), axis.z);
         assert!((area / want - 1.0).abs() < 1e-3, "{area} {want}");
-        assert!((reach - half).abs().max_element() < 0.02, "{reach} {half}");
     }
 
     #[test]

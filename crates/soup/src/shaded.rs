@@ -62,6 +62,18 @@ impl ShadedTexture {
         self.sample_level(0, uv)
     }
 
+    /// Alpha of [`ShadedTexture::sample`], without the rest.
+    #[inline]
+    pub fn sample_alpha(&self, uv: Vec2) -> f32 {
+        let l = &self.levels[0];
+        let Bilinear { columns: [xa, xb], rows: [ya, yb], fx, fy } =
+            Bilinear::new(l, self.wrap, uv);
+        let at = |x: usize, y: usize| f32::from(l.texels[y * l.width as usize + x][3]);
+        let top = at(xa, ya) * (1.0 - fx) + at(xb, ya) * fx;
+        let bottom = at(xa, yb) * (1.0 - fx) + at(xb, yb) * fx;
+        (top * (1.0 - fy) + bottom * fy) * (1.0 / ONE)
+    }
+
     /// Mean over the triangle `uv` of the texture: premultiplied linear RGBA in `0..=1`.
     ///
     /// The triangle is bisected across its longest edge, in texels, until its equal parts are
@@ -107,15 +119,8 @@ impl ShadedTexture {
 
     fn sample_level(&self, level: usize, uv: Vec2) -> [f32; 4] {
         let l = &self.levels[level];
-        let x = uv.x * l.width as f32 - 0.5;
-        let y = uv.y * l.height as f32 - 0.5;
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let [wx, wy] = self.wrap;
-        // `as i64` saturates: a hostile 1e30 coordinate stays a valid index.
-        let (ix, iy) = (x0 as i64, y0 as i64);
-        let (xa, xb) = (wx.index(ix, l.width), wx.index(ix.saturating_add(1), l.width));
-        let (ya, yb) = (wy.index(iy, l.height), wy.index(iy.saturating_add(1), l.height));
+        let Bilinear { columns: [xa, xb], rows: [ya, yb], fx, fy } =
+            Bilinear::new(l, self.wrap, uv);
         let row = |y: usize| &l.texels[y * l.width as usize..][..l.width as usize];
         let (top, bottom) = (row(ya), row(yb));
         std::array::from_fn(|c| {
@@ -123,6 +128,32 @@ impl ShadedTexture {
             let b = f32::from(bottom[xa][c]) * (1.0 - fx) + f32::from(bottom[xb][c]) * fx;
             (t * (1.0 - fy) + b * fy) * (1.0 / ONE)
         })
+    }
+}
+
+/// The four texels around a place, and how far it is from the first towards the last.
+struct Bilinear {
+    columns: [usize; 2],
+    rows: [usize; 2],
+    fx: f32,
+    fy: f32,
+}
+
+impl Bilinear {
+    #[inline]
+    fn new(level: &Level, [wx, wy]: [Wrap; 2], uv: Vec2) -> Self {
+        let (w, h) = (level.width, level.height);
+        let x = uv.x * w as f32 - 0.5;
+        let y = uv.y * h as f32 - 0.5;
+        let (x0, y0) = (x.floor(), y.floor());
+        // `as i64` saturates: a hostile 1e30 coordinate stays a valid index.
+        let (ix, iy) = (x0 as i64, y0 as i64);
+        Self {
+            columns: [wx.index(ix, w), wx.index(ix.saturating_add(1), w)],
+            rows: [wy.index(iy, h), wy.index(iy.saturating_add(1), h)],
+            fx: x - x0,
+            fy: y - y0,
+        }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Does the crown thin out or fatten? Coverage of cuts against that of the triangles they stand for.
 
 use anyhow::Result;
-use forest_draw::{Light, Style, Surfaces, draw_points};
+use forest_draw::{draw_points, read_surfaces};
 use forest_pack::{Pack, PackWriter};
 use forest_points::{BakeOptions, PixelArea, PointsBlock, RadiusRule, Thresholds, bake};
+use forest_raster::Style;
 use forest_soup::{Camera, Projection, TriangleSoup};
 use glam::DVec3;
 
@@ -12,8 +13,6 @@ const VIEWS: u32 = 16;
 /// s_m of the cuts, in square pixels of a picture of [`SIDE`] pixels.
 pub(crate) const CUTS: [f64; 5] = [0.0, 1.0, 4.0, 16.0, 64.0];
 pub(crate) const SIDE: u32 = 256;
-/// Samples a side of a pixel.
-const SAMPLES: u32 = 8;
 
 /// One cut, over all views.
 #[derive(Clone, Copy)]
@@ -35,8 +34,8 @@ pub(crate) fn measure(soup: &TriangleSoup, radius: RadiusRule) -> Result<Vec<Row
     writer.finish()?;
     let pack = Pack::open(&path)?;
     let block = PointsBlock::open(&pack)?;
-    let surfaces = Surfaces::read(&pack, &block)?;
-    let style = Style { samples: SAMPLES, light: Light::Albedo };
+    let surfaces = read_surfaces(&pack, &block)?;
+    let style = Style::default();
     let draw = |camera: &Camera, finest: f64, largest: f64| {
         let thresholds = Thresholds {
             finest: PixelArea(finest),

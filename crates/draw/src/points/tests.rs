@@ -1,9 +1,10 @@
 use super::*;
-use crate::Light;
 use forest_pack::{Pack, PackWriter};
 use forest_points::{BakeOptions, PixelArea, SurfelSize, bake};
-use forest_soup::{AlphaMode, TriangleSoup, Wrap};
-use glam::Vec3;
+use forest_raster::rasterize;
+use forest_soup::{AlphaMode, Material, Projection, Texture, TriangleSoup, Wrap};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// A unit square in the XY plane, textured with a checker of covered and bare quarters.
 fn card() -> TriangleSoup {
@@ -52,8 +53,7 @@ fn picture(pack: &Pack, forward: DVec3, largest: f64, projection: Projection) ->
         largest: PixelArea(largest),
         depth_bias: PixelArea(0.0),
     };
-    let style = Style { samples: 4, light: Light::Albedo };
-    draw_points(&block, Some(&surfaces), &camera, &t, &style)
+    draw_points(&block, Some(&surfaces), &camera, &t, &Style::default())
 }
 
 const ORTHO: Projection = Projection::Orthographic { height: 2.0 };
@@ -82,6 +82,23 @@ fn points_cover_as_much_as_triangles_from_every_side() {
         // Discs of the triangles' area lie over each other and leave gaps: less than the sum.
         let ratio = points.mean_coverage() / truth.mean_coverage();
         assert!((0.7..1.01).contains(&ratio), "{ratio}");
+    }
+}
+
+#[test]
+fn triangles_of_a_pack_are_those_of_its_source() {
+    let soup = card();
+    let pack = baked(&soup, 0.02);
+    for projection in [ORTHO, Projection::Perspective { fov_y: 0.9 }] {
+        let (p, _) = picture(&pack, DVec3::new(-0.5, 0.2, -0.8).normalize(), 0.0, projection);
+        let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+        let forward = DVec3::new(-0.5, 0.2, -0.8).normalize();
+        let eye = DVec3::new(0.5, 0.5, 0.0) - forward * 2.0;
+        let camera = Camera::new(eye, forward, projection, [64, 64]);
+        let truth = rasterize(&soup, &surfaces, &camera, &Style::default());
+        let differing = p.pixels.iter().zip(&truth.pixels).filter(|(a, b)| a != b).count();
+        assert!(differing < 40, "{differing}"); // quantised corners move the edges
+        assert!((p.mean_coverage() - truth.mean_coverage()).abs() < 1e-4);
     }
 }
 

@@ -18,7 +18,8 @@ pub fn covers(id: u32, x: u32, y: u32, opacity: u8) -> bool {
     (hash >> 16) * 255 < u32::from(opacity) << 16
 }
 
-fn mix(mut v: u32) -> u32 {
+/// A bijection of 32-bit words that scatters them.
+pub(crate) fn mix(mut v: u32) -> u32 {
     v ^= v >> 16;
     v = v.wrapping_mul(0x7feb_352d);
     v ^= v >> 15;

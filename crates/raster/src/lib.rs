@@ -1,0 +1,60 @@
+//! Triangle soups to pictures on the CPU.
+//!
+//! The ground truth that every level of detail is judged against, computed two ways that must
+//! agree sample by sample:
+//!
+//! * [`rasterize`], scanlines: the fast way, for base colours, depth, normals and light without
+//!   shadows. What sweeps and view bakes use.
+//! * [`RayScene`], rays through a bounding volume hierarchy (the library `obvhs`): slower, and the
+//!   only way to shadows and a hidden sky. What lit truths use, and what checks the scanlines.
+//!
+//! A pixel is the mean of its samples, 64 by default, stratified and seeded ([`Sampling`]).
+//! Textures are read at full resolution at every sample, so that a far leaf card has the right
+//! mean alpha: no mips, whose filtered alpha an alpha test would get wrong. What is partly
+//! transparent covers a sample by the hash rule ([`covers`]); nothing is blended or sorted.
+//!
+//! Renderers of other things (points, billboards) fill a [`DisplayList`] and [`draw`] it, so that
+//! there is one canvas.
+//!
+//! ```
+//! use forest_raster::{RayScene, Style, Surfaces, rasterize};
+//! use forest_soup::{Camera, Material, Projection, TriangleSoup};
+//! use glam::{DVec3, Vec3};
+//!
+//! let leaf = TriangleSoup {
+//!     positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+//!     triangles: vec![[0, 1, 2]],
+//!     triangle_materials: vec![0],
+//!     materials: vec![Material::default()],
+//!     ..TriangleSoup::default()
+//! };
+//! let surfaces = Surfaces::new(&leaf.materials, &leaf.textures);
+//! let projection = Projection::Orthographic { height: 2.0 };
+//! let camera = Camera::new(DVec3::new(0.5, 0.5, 3.0), -DVec3::Z, projection, [64, 64]);
+//! let truth = rasterize(&leaf, &surfaces, &camera, &Style::default());
+//! // Half a square unit in a picture of four.
+//! assert!((truth.mean_coverage() - 0.125).abs() < 1e-3);
+//! let again = RayScene::new(&leaf, &surfaces).picture(&camera, &Style::default());
+//! assert!((truth.mean_coverage() - again.mean_coverage()).abs() < 1e-6);
+//! ```
+
+mod canvas;
+mod light;
+mod list;
+mod mesh;
+mod opacity;
+mod picture;
+mod plane;
+mod rays;
+mod sampling;
+mod surface;
+
+pub use canvas::{Style, draw};
+pub use light::{Light, Sun};
+pub use list::{Corner, DisplayList, Ellipse, Projector};
+pub use mesh::rasterize;
+pub use opacity::covers;
+pub use picture::Picture;
+pub use rays::RayScene;
+pub use sampling::Sampling;
+pub use surface::Surfaces;

@@ -1,0 +1,72 @@
+//! Light on surfaces: none, or a sun and a sky.
+
+use glam::{DVec3, Vec3};
+
+/// What a picture shows of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Light {
+    /// Base colours as they are.
+    #[default]
+    Albedo,
+    /// A sun and a uniform sky on matt surfaces.
+    Sun(Sun),
+}
+
+/// A distant sun and a uniform sky.
+///
+/// A matt surface of base colour c and normal n (turned towards the eye) shows
+/// c·(sun·(max(n·l, 0) + translucency·max(−n·l, 0))·V + sky·S). V is 1 where the sun is seen and S
+/// the cosine-weighted share of the sky that is seen; pictures without shadows have both at 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sun {
+    /// Unit vector towards the sun.
+    pub to_sun: DVec3,
+    /// Radiance that a white surface facing the sun shows: irradiance over π, linear RGB.
+    pub sun: [f32; 3],
+    /// Radiance of the sky, linear RGB.
+    pub sky: [f32; 3],
+    /// Share of the sunlight on the far side that shines through, in `0..=1`.
+    pub translucency: f32,
+}
+
+impl Light {
+    /// A high sun from the left, behind the camera's shoulder; leaves shine through.
+    pub const MORNING: Self = Self::Sun(Sun {
+        to_sun: DVec3::new(-0.48, 0.72, 0.501_199),
+        sun: [0.55; 3],
+        sky: [0.45; 3],
+        translucency: 1.0,
+    });
+
+    /// Factors on the base colour of a surface whose unit normal `normal` faces the eye, without
+    /// shadows.
+    pub fn unshadowed(&self, normal: Vec3) -> [f32; 3] {
+        match self {
+            Light::Albedo => [1.0; 3],
+            Light::Sun(sun) => sun.factors(normal, 1.0, 1.0),
+        }
+    }
+}
+
+impl Sun {
+    /// Factors on the base colour where `sunlit` of the sun and `skylit` of the sky is seen.
+    pub(crate) fn factors(&self, normal: Vec3, sunlit: f32, skylit: f32) -> [f32; 3] {
+        let cos = normal.dot(self.to_sun.as_vec3());
+        let direct = (cos.max(0.0) + self.translucency * (-cos).max(0.0)) * sunlit;
+        std::array::from_fn(|k| self.sun[k] * direct + self.sky[k] * skylit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_far_side_gets_what_shines_through() {
+        let sun = Sun { to_sun: DVec3::Y, sun: [2.0; 3], sky: [0.5; 3], translucency: 0.25 };
+        assert_eq!(Light::Sun(sun).unshadowed(Vec3::Y), [2.5; 3]);
+        assert_eq!(Light::Sun(sun).unshadowed(Vec3::NEG_Y), [1.0; 3]);
+        assert_eq!(sun.factors(Vec3::Y, 0.0, 0.5), [0.25; 3]);
+        assert_eq!(Light::Albedo.unshadowed(Vec3::X), [1.0; 3]);
+    }
+}

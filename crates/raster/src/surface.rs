@@ -1,0 +1,73 @@
+//! Materials, ready to be sampled.
+
+use forest_soup::{AlphaMode, Material, ShadedTexture, Texture};
+use glam::Vec2;
+use std::sync::Arc;
+
+/// The materials of a soup or a pack with their textures in linear light.
+#[derive(Clone, Debug, Default)]
+pub struct Surfaces(Vec<Surface>);
+
+impl Surfaces {
+    /// Prepares `materials`, whose texture indices must lie in `textures`.
+    pub fn new(materials: &[Material], textures: &[Arc<Texture>]) -> Self {
+        Self(materials.iter().map(|m| Surface::new(m, textures)).collect())
+    }
+
+    /// Surface of material `index`.
+    pub(crate) fn get(&self, index: u16) -> Option<&Surface> {
+        self.0.get(usize::from(index))
+    }
+}
+
+/// A material with its texture at full resolution: a far card must have the right *mean* alpha,
+/// which a filtered texture behind an alpha test has not.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    material: Material,
+    texture: Option<ShadedTexture>,
+    /// Some of it may be seen through.
+    pub(crate) translucent: bool,
+}
+
+impl Surface {
+    fn new(material: &Material, textures: &[Arc<Texture>]) -> Self {
+        // Sampled alpha goes through the material's rule at each sample: keep it raw.
+        let alpha_mode = match material.alpha_mode {
+            AlphaMode::Opaque => AlphaMode::Opaque,
+            AlphaMode::Mask { .. } | AlphaMode::Blend => AlphaMode::Blend,
+        };
+        let [r, g, b, _] = material.base_color;
+        let raw = Material { alpha_mode, base_color: [r, g, b, 1.0], ..material.clone() };
+        let texture = material.texture.map(|t| ShadedTexture::new(&textures[t as usize], &raw));
+        let translucent = material.alpha_mode != AlphaMode::Opaque;
+        Self { material: material.clone(), texture, translucent }
+    }
+
+    pub(crate) fn is_unlit(&self) -> bool {
+        self.material.unlit
+    }
+
+    /// Coverage under vertex alpha `tint`: that of [`Surface::at`], at less cost.
+    #[inline]
+    pub(crate) fn coverage(&self, uv: Vec2, tint: f32) -> f32 {
+        let alpha = self.texture.as_ref().map_or(1.0, |texture| texture.sample_alpha(uv));
+        self.material.coverage(alpha, tint)
+    }
+
+    /// Linear RGB under vertex colour `tint`, and coverage. The colour of what covers nothing is
+    /// black.
+    pub(crate) fn at(&self, uv: Vec2, tint: [f32; 4]) -> ([f32; 3], f32) {
+        let [r, g, b, _] = self.material.base_color;
+        let (rgb, alpha) = match &self.texture {
+            Some(texture) => {
+                let [r, g, b, a] = texture.sample(uv);
+                let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
+                ([r, g, b].map(|v| v * scale), a)
+            }
+            None => ([r, g, b], 1.0),
+        };
+        let coverage = self.material.coverage(alpha, tint[3]);
+        (std::array::from_fn(|k| rgb[k] * tint[k]), coverage)
+    }
+}

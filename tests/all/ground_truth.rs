@@ -1,0 +1,203 @@
+//! The ground truth: two ways that must agree, and an independent renderer's pictures.
+
+use crate::support::{repo, shared};
+use forest_import::{Block, Limits};
+use forest_raster::{Light, Picture, RayScene, Sampling, Style, Sun, Surfaces, rasterize};
+use forest_soup::{Camera, Projection, TriangleSoup, srgb8_to_linear};
+use glam::DVec3;
+use std::io::Write;
+use std::path::Path;
+
+fn soup(path: &Path) -> TriangleSoup {
+    let block = Block::parse(&[path.to_string_lossy()]).unwrap();
+    block.load(&Limits::default()).unwrap().model.flatten(10_000_000).unwrap()
+}
+
+fn mean_square(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (4 * a.len()) as f64
+}
+
+/// Looks at all of a soup along `forward`.
+fn overview(soup: &TriangleSoup, forward: DVec3, projection: &str, side: u32) -> Camera {
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for p in soup.positions.iter().filter(|p| p.is_finite()) {
+        (min, max) = (min.min(p.as_dvec3()), max.max(p.as_dvec3()));
+    }
+    let (center, radius) = (soup.origin + (min + max) * 0.5, (max - min).length() * 0.5);
+    let forward = forward.normalize();
+    let projection = match projection {
+        "parallel" => Projection::Orthographic { height: 2.0 * radius },
+        _ => Projection::Perspective { fov_y: 1.0 },
+    };
+    Camera::new(center - forward * (2.2 * radius), forward, projection, [side; 2])
+}
+
+fn two_ways(soup: &TriangleSoup, camera: &Camera, sampling: Sampling) -> [Picture; 2] {
+    let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+    let style = Style { sampling, light: Light::Albedo };
+    let rays = RayScene::new(soup, &surfaces).picture(camera, &style);
+    [rasterize(soup, &surfaces, camera, &style), rays]
+}
+
+#[test]
+fn scanlines_and_rays_agree_on_every_tree() {
+    let mut trees: Vec<_> = ["conifer.glb", "broadleaf_young.gltf", "shrub.obj"]
+        .map(|f| repo("sample-data").join(f))
+        .into();
+    for name in [
+        "sap_pine_20k.glb",
+        "sap_pine_20k.obj",
+        "ez_ash_medium.glb",
+        "ez_oak_dense_200k.glb",
+        "ez_oak_wrapped_u16.glb",
+        "sap_birch_200k.glb",
+        "sap_jmaple_450k.glb",
+        "japaneseMaple/japaneseMaple.obj",
+        "christmas_tree/christmas_tree.obj",
+        "bush/bush.obj",
+    ] {
+        trees.extend(shared("trees").map(|t| t.join(name)));
+    }
+    for tree in trees {
+        let soup = soup(&tree);
+        for (projection, forward) in
+            [("parallel", DVec3::new(-0.3, -0.4, -0.8)), ("perspective", DVec3::new(0.9, 0.2, 0.1))]
+        {
+            let camera = overview(&soup, forward, projection, 96);
+            let [a, b] = two_ways(&soup, &camera, Sampling { side: 4, seed: 3 });
+            let rmse = mean_square(&a.pixels, &b.pixels).sqrt();
+            let name = tree.file_name().unwrap().to_string_lossy();
+            let _ = writeln!(std::io::stderr(), "{name}, {projection}: RMSE {rmse:.5}");
+            assert!(a.mean_coverage() > 0.02, "{name}: nothing to see");
+            assert!(rmse <= 0.01, "{name}, {projection}: {rmse}");
+            let both = a.depth.iter().zip(&b.depth).zip(&a.pixels).zip(&b.pixels);
+            let (mut error, mut n) = (0.0, 0);
+            for (((da, db), pa), pb) in both {
+                if pa[3] == 1.0 && pb[3] == 1.0 {
+                    error += f64::from(da - db).abs();
+                    n += 1;
+                }
+            }
+            let size = camera.eye.distance(soup.origin);
+            assert!(n == 0 || error / f64::from(n) < 2e-3 * size, "{name}: depth {error} of {n}");
+        }
+    }
+}
+
+struct Reference {
+    pixels: Vec<[f32; 4]>,
+    camera: Camera,
+    sun: Sun,
+}
+
+fn vector(v: &serde_json::Value) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|k| v[k].as_f64().unwrap()))
+}
+
+/// A picture of ../shared/reference with its camera and light.
+fn reference(folder: &Path, view: &str, kind: &str) -> Reference {
+    let json = std::fs::read(folder.join("cameras.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let image = image::open(folder.join(format!("{kind}_{view}.png"))).unwrap().into_rgba8();
+    let pixels = image.pixels().map(|p| {
+        let [r, g, b, a] = p.0;
+        let alpha = f32::from(a) / 255.0;
+        let [r, g, b] = [r, g, b].map(|c| srgb8_to_linear(c) * alpha);
+        [r, g, b, alpha]
+    });
+    let v = &json["views"][view];
+    let half = json["ortho_half"].as_f64().unwrap();
+    let back = vector(&v["dir_to_camera_gltf"]).normalize();
+    let (right, up) = (vector(&v["right_gltf"]).normalize(), vector(&v["up_gltf"]).normalize());
+    let camera = Camera {
+        eye: vector(&json["center_gltf"]) + back * (4.0 * half),
+        right,
+        up,
+        forward: -back,
+        projection: Projection::Orthographic { height: 2.0 * half },
+        width: image.width(),
+        height: image.height(),
+    };
+    let [x, y, z] = vector(&json["sun_dir_to_light_blender"]).normalize().to_array();
+    let strength = json["world_strength"].as_f64().unwrap();
+    let sun = Sun {
+        to_sun: DVec3::new(x, z, -y),
+        sun: [(json["sun_energy"].as_f64().unwrap() / std::f64::consts::PI) as f32; 3],
+        sky: vector(&json["world_rgb"]).to_array().map(|c| (c * strength) as f32),
+        translucency: 0.0,
+    };
+    Reference { pixels: pixels.collect(), camera, sun }
+}
+
+const REFERENCES: [(&str, &str); 5] = [
+    ("ez_oak_dense_200k", "ez_oak_dense_200k.glb"),
+    ("sap_birch_200k", "sap_birch_200k.glb"),
+    ("sap_jmaple_450k", "sap_jmaple_450k.glb"),
+    ("sap_pine_20k", "sap_pine_20k.glb"),
+    ("scopia_japaneseMaple", "japaneseMaple/japaneseMaple.obj"),
+];
+const VIEWS: [&str; 4] = ["front", "right", "diag45", "top"];
+
+/// How a picture compares with the reference: mean coverage, largest difference of a mean colour
+/// channel (premultiplied), RMSE after a 4×4 box filter.
+fn against(reference: &[[f32; 4]], ours: &Picture) -> [f64; 3] {
+    let theirs = Picture { pixels: reference.to_vec(), ..ours.clone() };
+    let mean = |p: &Picture, c: usize| {
+        p.pixels.iter().map(|v| f64::from(v[c])).sum::<f64>() / p.pixels.len() as f64
+    };
+    let difference = |c| mean(ours, c) - mean(&theirs, c);
+    let colour = (0..3).map(|c| difference(c).abs()).fold(0.0, f64::max);
+    let (a, b) = (ours.box_filtered(4), theirs.box_filtered(4));
+    [difference(3), colour, mean_square(&a.pixels, &b.pixels).sqrt()]
+}
+
+#[test]
+fn albedo_is_that_of_an_independent_renderer() {
+    let (Some(references), Some(trees)) = (shared("reference"), shared("trees")) else { return };
+    for (name, file) in REFERENCES {
+        let soup = soup(&trees.join(file));
+        let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+        for view in VIEWS {
+            let r = reference(&references.join(name), view, "albedo");
+            let ours = rasterize(&soup, &surfaces, &r.camera, &Style::default());
+            let [coverage, colour, rmse] = against(&r.pixels, &ours);
+            let _ = writeln!(
+                std::io::stderr(),
+                "{name} {view}: coverage {coverage:+.5}, colour {colour:.5}, RMSE {rmse:.5}"
+            );
+            assert!(coverage.abs() <= 0.005, "{name} {view}: coverage off by {coverage}");
+            assert!(colour <= 0.01, "{name} {view}: mean colour off by {colour}");
+            assert!(rmse <= 0.03, "{name} {view}: RMSE {rmse}");
+        }
+    }
+}
+
+/// Their light has bounces and highlights that ours leaves out: ours is 75 to 88 % of theirs, less
+/// where the crown is denser. Their maple is darker instead, and by view: as if the twin it was rendered
+/// from had kept glTF's metallic default, whose rough metal loses a third to a half of the light.
+#[test]
+fn light_is_that_of_an_independent_renderer_but_for_bounces() {
+    let (Some(references), Some(trees)) = (shared("reference"), shared("trees")) else { return };
+    for (name, file) in REFERENCES {
+        let soup = soup(&trees.join(file));
+        let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+        let scene = RayScene::new(&soup, &surfaces);
+        for view in VIEWS {
+            let r = reference(&references.join(name), view, "lit");
+            let style = Style { light: Light::Sun(r.sun), sampling: Sampling { side: 4, seed: 1 } };
+            let ours = scene.picture(&r.camera, &style);
+            let [_, colour, rmse] = against(&r.pixels, &ours);
+            let mean =
+                |p: &[[f32; 4]]| p.iter().map(|v| f64::from(v[0] + v[1] + v[2])).sum::<f64>();
+            let ratio = mean(&ours.pixels) / mean(&r.pixels);
+            let _ = writeln!(
+                std::io::stderr(),
+                "{name} {view}: {ratio:.3} of the light, colour {colour:.5}, RMSE {rmse:.5}"
+            );
+            let metal = name == "scopia_japaneseMaple";
+            let range = if metal { 1.2..2.2 } else { 0.7..1.0 };
+            assert!(range.contains(&ratio), "{name} {view}: {ratio} of the light");
+        }
+    }
+}
