@@ -23,6 +23,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-points", &["forest-soup", "forest-pack"]),
     ("forest-raster", &["forest-soup"]),
     ("forest-draw", &["forest-soup", "forest-raster", "forest-pack", "forest-points"]),
+    (
+        "forest-eval",
+        &["forest-soup", "forest-raster", "forest-pack", "forest-points", "forest-draw"],
+    ),
     ("forest-sample-data", &["forest-soup"]),
     (
         "forest-bake",
@@ -33,6 +37,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-points",
             "forest-raster",
             "forest-draw",
+            "forest-eval",
         ],
     ),
     (
@@ -44,6 +49,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-points",
             "forest-raster",
             "forest-draw",
+            "forest-eval",
             "forest-sample-data",
         ],
     ),

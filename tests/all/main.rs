@@ -3,6 +3,7 @@
 mod architecture; // the arrows between crates, licences, one version of what must be one
 mod blocks; // several trees baked together
 mod cli; // the program: usage, exit codes, what it prints, what it leaves behind
+mod eval; // packs against their sources: reports, calibration, chosen levels
 mod fuzz_corpus; // inputs that fuzzing found or started from
 mod goldens; // committed packs: read, damaged, baked again
 mod ground_truth; // the pictures that packs are judged against: two ways, and another's

@@ -1,16 +1,18 @@
 //! `forest-bake draw`.
 
 use crate::failure::Usage;
-use anyhow::{Context, Result};
+use crate::output;
+use anyhow::Result;
 use forest_draw::{draw_points, read_surfaces};
 use forest_pack::Pack;
+use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds};
 use forest_raster::{Light, Picture, Sampling, Style};
 use forest_soup::{Camera, Projection};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
-use std::io::{Cursor, Write};
-use std::path::{Path, PathBuf};
+use std::io::Cursor;
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -39,6 +41,13 @@ pub(crate) struct Args {
     /// k, added to both at the back of the block and taken from them at its front.
     #[arg(long, default_value_t = 0.0, value_name = "PX2", allow_hyphen_values = true)]
     bias: f64,
+    /// Choose the cheapest level whose FLIP error is at most this, by the pack's measured table
+    /// (`points --measure`).
+    #[arg(long, value_name = "FLIP", conflicts_with_all = ["finest", "largest", "bias", "budget"])]
+    error: Option<f32>,
+    /// Choose the best level with at most this many primitives, by the measured table.
+    #[arg(long, value_name = "N", conflicts_with_all = ["finest", "largest", "bias"])]
+    budget: Option<f32>,
     /// Light.
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
@@ -77,16 +86,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     };
     let style = Style { sampling: Sampling { side: args.samples, seed: 1 }, light };
     let mut pictures = Vec::new();
-    for &finest in &args.finest {
-        let thresholds = Thresholds {
-            finest: PixelArea(finest),
-            largest: PixelArea(args.largest.unwrap_or(16.0 * finest)),
-            depth_bias: PixelArea(args.bias),
-        };
+    for thresholds in args.levels(&pack, &block, &camera, quiet)? {
         let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, &style);
         if !quiet {
             eprintln!(
-                "s_m {finest} px²: {} points, {} triangles, coverage {:.4}",
+                "s_m {} px²: {} points, {} triangles, coverage {:.4}",
+                thresholds.finest.0,
                 drawn.points,
                 drawn.triangles,
                 picture.mean_coverage()
@@ -98,6 +103,49 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
 }
 
 impl Args {
+    /// What to draw: the thresholds that were given, or the level that the table promises.
+    fn levels(
+        &self,
+        pack: &Pack,
+        block: &PointsBlock,
+        camera: &Camera,
+        quiet: bool,
+    ) -> Result<Vec<Thresholds>> {
+        let Some(limit) = self.error.or(self.budget) else {
+            let thresholds = |&finest: &f64| Thresholds {
+                finest: PixelArea(finest),
+                largest: PixelArea(self.largest.unwrap_or(16.0 * finest)),
+                depth_bias: PixelArea(self.bias),
+            };
+            return Ok(self.finest.iter().map(thresholds).collect());
+        };
+        let name = self.pack.display();
+        let Some(table) = Measures::read(pack)? else {
+            let hint = "bake it with --measure, or `forest-bake eval --embed`";
+            return Err(Usage(format!("{name}: has no measured table; {hint}")).into());
+        };
+        let need = block.need(camera, ErrorKind::Flip);
+        let choice = match self.error {
+            Some(_) => table.cheapest(&need, limit),
+            None => table.best_within(&need, limit),
+        };
+        let Some(choice) = choice else {
+            let best = table.cheapest(&need, f32::INFINITY).map_or(0.0, |c| c.primitives);
+            let problem = format!(
+                "no measured level does that at {:.0} pixels (the smallest draws {best:.0} primitives)",
+                need.pixel_height
+            );
+            return Err(Usage(format!("{name}: {problem}")).into());
+        };
+        if !quiet {
+            eprintln!(
+                "chosen at {:.0} pixels: FLIP at most {:.4}, about {:.0} primitives",
+                need.pixel_height, choice.error, choice.primitives
+            );
+        }
+        Ok(vec![Thresholds::of_level(choice.level)])
+    }
+
     fn camera(&self, block: &PointsBlock) -> Result<Camera> {
         let [yaw, pitch] = match self.view.as_str() {
             "front" => [0.0, 0.0],
@@ -164,16 +212,5 @@ fn write(args: &Args, pictures: &[Picture]) -> Result<()> {
     };
     let mut png = Cursor::new(Vec::new());
     sheet.write_to(&mut png, ImageFormat::Png)?;
-    let name = || args.output.display().to_string();
-    let folder = args.output.parent().filter(|p| !p.as_os_str().is_empty());
-    let mut file = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = file.tempfile_in(folder.unwrap_or(Path::new("."))).with_context(name)?;
-    file.write_all(png.get_ref()).with_context(name)?;
-    file.persist(&args.output).map_err(|e| e.error).with_context(name)?;
-    Ok(())
+    output::write_file(&args.output, png.get_ref())
 }

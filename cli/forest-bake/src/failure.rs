@@ -1,5 +1,6 @@
 //! Errors to exit codes.
 
+use forest_eval::EvalError;
 use forest_import::ImportError;
 use forest_pack::PackError;
 use forest_points::BakeError;
@@ -44,14 +45,28 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
         return Some(pack(e));
     }
     if let Some(e) = cause.downcast_ref::<BakeError>() {
+        return Some(bake(e));
+    }
+    if let Some(e) = cause.downcast_ref::<EvalError>() {
         return Some(match e {
-            BakeError::Option { .. } => 1,
-            BakeError::Pack(e) => pack(e),
-            BakeError::TooManyPoints(_) => 4,
-            _ => 3,
+            EvalError::Plan { .. } => 1,
+            EvalError::Temporary(_) => 2,
+            EvalError::Pack(e) => pack(e),
+            EvalError::Bake(e) => bake(e),
+            EvalError::Soup(_) | EvalError::NothingToSee => 3,
+            _ => 4,
         });
     }
     cause.is::<FlattenError>().then_some(3)
+}
+
+fn bake(e: &BakeError) -> u8 {
+    match e {
+        BakeError::Option { .. } => 1,
+        BakeError::Pack(e) => pack(e),
+        BakeError::TooManyPoints(_) => 4,
+        _ => 3,
+    }
 }
 
 fn pack(e: &PackError) -> u8 {

@@ -3,6 +3,7 @@
 use crate::output;
 use anyhow::Result;
 use forest_pack::header::{self, Meta};
+use forest_pack::measures::{Measure, Measures};
 use forest_pack::{Codec, Pack, SectionId, kind};
 use forest_points::{BakeCounts, PointsBlock};
 use serde::Serialize;
@@ -29,6 +30,14 @@ struct Report {
     sources: Vec<SourceReport>,
     sections: Vec<SectionReport>,
     points: Option<PointsReport>,
+    measures: Option<MeasuresReport>,
+}
+
+/// The measured table.
+#[derive(Serialize)]
+struct MeasuresReport {
+    method: String,
+    rows: Vec<Measure>,
 }
 
 #[derive(Serialize)]
@@ -64,6 +73,8 @@ struct PointsReport {
     /// Positions are off by at most this along each axis.
     position_error: f64,
     bytes_per_surfel: f64,
+    /// Whether the points' areas were corrected by what was seen (`points --measure`).
+    calibrated: bool,
     /// Radii of the finest and the coarsest point.
     radius_range: [f64; 2],
 }
@@ -104,6 +115,8 @@ impl Report {
         } else {
             None
         };
+        let measures =
+            Measures::read(pack)?.map(|Measures { method, rows }| MeasuresReport { method, rows });
         Ok(Self {
             schema: "forest-bake/inspect/1",
             file: pack.path().into(),
@@ -113,6 +126,7 @@ impl Report {
             sources,
             sections,
             points,
+            measures,
         })
     }
 
@@ -133,6 +147,9 @@ impl Report {
         if let Some(p) = &self.points {
             p.text(&mut t)?;
         }
+        if let Some(m) = &self.measures {
+            m.text(&mut t)?;
+        }
         writeln!(t, "sections")?;
         for s in &self.sections {
             let name = format!("{}[{}]", s.name, s.index);
@@ -145,6 +162,43 @@ impl Report {
             writeln!(t, "  {name:<26} {stored:>12}{packed}")?;
         }
         Ok(t)
+    }
+}
+
+impl MeasuresReport {
+    /// A line a level and height: means over the bands of elevation, the worst of their errors.
+    fn text(&self, t: &mut String) -> std::fmt::Result {
+        writeln!(t, "measured: {}", self.method)?;
+        writeln!(
+            t,
+            "  {:>6} {:>10} {:>11} {:>8} {:>8} {:>9}",
+            "height", "s_m, px²", "primitives", "FLIP ≤", "RMSE ≤", "coverage"
+        )?;
+        let mut told: Vec<(f32, [f32; 3])> = Vec::new();
+        for r in &self.rows {
+            let key = (r.pixel_height, r.level);
+            if told.contains(&key) {
+                continue;
+            }
+            told.push(key);
+            let same: Vec<&Measure> =
+                self.rows.iter().filter(|o| (o.pixel_height, o.level) == key).collect();
+            let mean = |of: fn(&Measure) -> f32| {
+                same.iter().map(|r| of(r)).sum::<f32>() / same.len() as f32
+            };
+            let worst = |of: fn(&Measure) -> f32| same.iter().map(|r| of(r)).fold(0.0, f32::max);
+            writeln!(
+                t,
+                "  {:>6} {:>10} {:>11} {:>8.4} {:>8.4} {:>8.1}%",
+                r.pixel_height,
+                r.level[0],
+                output::count(mean(|r| r.primitives) as u64),
+                worst(|r| r.flip_worst),
+                worst(|r| r.rmse_worst),
+                100.0 * mean(|r| r.coverage)
+            )?;
+        }
+        Ok(())
     }
 }
 
@@ -169,6 +223,7 @@ impl PointsReport {
             alpha_tolerance: h.alpha_tolerance,
             position_error: 0.5 * f64::from(h.step_exponent).exp2() * scale,
             bytes_per_surfel: size_of_val(block.points) as f64 / h.counts.surfels.max(1) as f64,
+            calibrated: block.calibration.is_some(),
             radius_range: [radius(radii.clone().min()), radius(radii.max())],
         }
     }

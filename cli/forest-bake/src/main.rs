@@ -1,6 +1,7 @@
 //! `forest-bake`: tree models in, LOD packs out. One file a subcommand; no algorithm here.
 
 mod draw;
+mod eval;
 mod failure;
 mod inspect;
 mod levels;
@@ -35,6 +36,8 @@ enum Command {
     Points(points::Args),
     /// Draw a picture of a pack, at one or several levels of detail.
     Draw(draw::Args),
+    /// Judge a pack against its source: error by cost, view and distance, beside other ways.
+    Eval(eval::Args),
     /// Print what is in a pack.
     Inspect(inspect::Args),
     /// Check every byte and rule of packs.
@@ -70,6 +73,7 @@ fn run(args: Args) -> anyhow::Result<()> {
     match args.command {
         Command::Points(a) => points::run(&a, quiet),
         Command::Draw(a) => draw::run(&a, quiet),
+        Command::Eval(a) => eval::run(&a, quiet),
         Command::Inspect(a) => inspect::run(&a),
         Command::Verify(a) => verify::run(&a, quiet),
         Command::Levels(a) => levels::run(&a, quiet),

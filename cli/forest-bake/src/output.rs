@@ -1,7 +1,9 @@
 //! Data on stdout, everything else on stderr.
 
+use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 
 /// Prints to stdout; a reader that has seen enough (`| head`) is no error.
 pub(crate) fn print(text: &str) -> std::io::Result<()> {
@@ -31,4 +33,20 @@ pub(crate) fn bytes(n: u64) -> String {
 /// A count with separators.
 pub(crate) fn count(n: u64) -> String {
     indicatif::HumanCount(n).to_string()
+}
+
+/// Writes a file whole or not at all.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    let name = || path.display().to_string();
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let mut file = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = file.tempfile_in(folder.unwrap_or(Path::new("."))).with_context(name)?;
+    file.write_all(bytes).with_context(name)?;
+    file.persist(path).map_err(|e| e.error).with_context(name)?;
+    Ok(())
 }

@@ -29,6 +29,10 @@ pub(crate) struct Args {
     /// Leave out triangles, materials and textures.
     #[arg(long)]
     points_only: bool,
+    /// Draw the pack and its source: correct the points' areas by what is seen, and write a table of
+    /// errors and costs by level, height and elevation into the pack.
+    #[arg(long)]
+    measure: bool,
     /// Replace a pack of another source, or one with sections this version does not know.
     #[arg(long)]
     force: bool,
@@ -71,6 +75,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         }
     }
     writer.finish()?;
+    if args.measure {
+        crate::eval::measure(&args.output, &source.soup, quiet)?;
+    }
     let summary = Summary::new(&args.output, &source, &report, start.elapsed().as_secs_f64())?;
     if !quiet {
         summary.tell(&report);
@@ -125,7 +132,8 @@ fn existing(args: &Args, meta: &Meta) -> Result<Option<Pack>> {
 /// Whether a section belongs to another representation.
 fn is_foreign(kind: u16, options: &BakeOptions) -> bool {
     match kind {
-        kind::META | kind::POINTS_HEADER..=kind::POINTS_TRIANGLE_COLORS => false,
+        kind::META | kind::MEASURES => false,
+        kind::POINTS_HEADER..=kind::POINTS_CALIBRATION => false,
         kind::MATERIALS | kind::TEXTURE => !options.triangles,
         _ => true,
     }

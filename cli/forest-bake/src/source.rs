@@ -13,6 +13,13 @@ pub(crate) struct SourceArgs {
     /// block file (.toml).
     #[arg(required = true, value_name = "TREE")]
     trees: Vec<String>,
+    #[command(flatten)]
+    import: ImportArgs,
+}
+
+/// What source files may hold.
+#[derive(clap::Args)]
+pub(crate) struct ImportArgs {
     /// Refuse blocks of more triangles.
     #[arg(long, default_value_t = 50_000_000, value_name = "N")]
     max_triangles: u64,
@@ -34,8 +41,15 @@ pub(crate) struct LoadedSource {
 impl SourceArgs {
     /// Reads and flattens; warnings go to stderr.
     pub(crate) fn load(&self, quiet: bool) -> Result<LoadedSource> {
+        self.import.load(&self.trees, quiet)
+    }
+}
+
+impl ImportArgs {
+    /// Reads and flattens `trees`; warnings go to stderr.
+    pub(crate) fn load(&self, trees: &[String], quiet: bool) -> Result<LoadedSource> {
         let start = Instant::now();
-        let block = Block::parse(&self.trees)?;
+        let block = Block::parse(trees)?;
         let limits = Limits { allow_outside: self.allow_outside, ..Limits::default() };
         let loaded = block.load(&limits)?;
         if !quiet {

@@ -3,6 +3,7 @@
 use crate::output;
 use anyhow::Result;
 use forest_pack::header::{self, Meta};
+use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, SectionId, kind};
 use forest_points::{PointsBlock, read_materials};
 use std::path::{Path, PathBuf};
@@ -33,6 +34,7 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
     let pack = Pack::open(path)?;
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
+    Measures::read(&pack)?;
     if !PointsBlock::is_in(&pack) {
         return Ok(());
     }

@@ -35,4 +35,4 @@
 
 mod points;
 
-pub use points::{Drawn, draw_points, point_ellipses, read_surfaces};
+pub use points::{Drawn, PointsFrame, draw_points, point_ellipses, read_surfaces};

@@ -49,18 +49,64 @@ pub fn draw_points(
     thresholds: &Thresholds,
     style: &Style,
 ) -> (Picture, Drawn) {
-    let mut thresholds = *thresholds;
-    if surfaces.is_none() {
-        thresholds.largest.0 = f64::INFINITY;
+    let frame = PointsFrame::new(block, surfaces, camera, thresholds, style);
+    (frame.draw(), frame.drawn)
+}
+
+/// A picture before it is drawn: what was selected and projected.
+pub struct PointsFrame<'a> {
+    list: DisplayList<'a>,
+    camera: &'a Camera,
+    style: &'a Style,
+    drawn: Drawn,
+    bytes: u64,
+}
+
+impl<'a> PointsFrame<'a> {
+    /// Selects and projects; the arguments are those of [`draw_points`].
+    pub fn new(
+        block: &PointsBlock,
+        surfaces: Option<&'a Surfaces>,
+        camera: &'a Camera,
+        thresholds: &Thresholds,
+        style: &'a Style,
+    ) -> Self {
+        let mut thresholds = *thresholds;
+        if surfaces.is_none() {
+            thresholds.largest.0 = f64::INFINITY;
+        }
+        let cut = select(block, camera, &thresholds);
+        let mut list = DisplayList::of_ellipses(point_ellipses(block, &cut, camera, style));
+        if let Some(surfaces) = surfaces {
+            triangles(block, &cut, camera, surfaces, &mut list);
+        }
+        let points = cut.points(block).count() as u64;
+        let drawn = Drawn { points, triangles: cut.triangle_count() };
+        let looked_at: u64 = cut.cells.iter().map(|c| c.points.len() as u64).sum();
+        let bytes = looked_at * size_of::<PointRecord>() as u64
+            + drawn.triangles * size_of::<TriangleRecord>() as u64;
+        Self { list, camera, style, drawn, bytes }
     }
-    let cut = select(block, camera, &thresholds);
-    let ellipses = point_ellipses(block, &cut, camera, style);
-    let drawn = Drawn { points: cut.points(block).count() as u64, triangles: cut.triangle_count() };
-    let mut list = DisplayList::of_ellipses(ellipses);
-    if let Some(surfaces) = surfaces {
-        triangles(block, &cut, camera, surfaces, &mut list);
+
+    /// What will be drawn.
+    pub fn drawn(&self) -> Drawn {
+        self.drawn
     }
-    (draw(&list, camera, style), drawn)
+
+    /// Bytes of the records that a renderer looks at: ranges of points, and triangles.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The points, to be changed: other looks to compare with.
+    pub fn ellipses(&mut self) -> &mut [Ellipse] {
+        self.list.ellipses_mut()
+    }
+
+    /// The picture.
+    pub fn draw(&self) -> Picture {
+        draw(&self.list, self.camera, self.style)
+    }
 }
 
 /// The points of a cut as `camera` sees them, lit as `style` says, without those behind the eye.
@@ -100,7 +146,7 @@ fn ellipse(
     }
     let (axis, to_eye) = (p.axis(), camera.to_eye(world));
     let center = DVec2::new(x, y);
-    let radius = p.own().radius() * block.scale() * camera.pixels_per_unit(depth);
+    let radius = block.radius(p) * block.scale() * camera.pixels_per_unit(depth);
     // y points down in a picture.
     let plane = [camera.right, -camera.up];
     let f = Footprint::new(center, radius, p.flatness_step(), axis, to_eye, plane);

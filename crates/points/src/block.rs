@@ -1,9 +1,12 @@
 //! Reading the points of a pack.
 
+use crate::calibration::Calibration;
 use crate::header::{CellRecord, PointsHeader};
 use crate::record::PointRecord;
 use crate::triangle::TriangleRecord;
+use forest_pack::measures::{ErrorKind, Need};
 use forest_pack::{Pack, PackError, SectionId, header, kind};
+use forest_soup::Camera;
 use glam::DVec3;
 
 /// The points representation of a pack, its arrays in place in the memory map.
@@ -19,6 +22,8 @@ pub struct PointsBlock<'a> {
     pub triangles: &'a [TriangleRecord],
     /// Vertex colours of the triangles (sRGB and alpha), or empty.
     pub triangle_colors: &'a [[[u8; 4]; 3]],
+    /// Measured factors on areas, if the pack has them.
+    pub calibration: Option<Calibration>,
 }
 
 impl<'a> PointsBlock<'a> {
@@ -35,6 +40,7 @@ impl<'a> PointsBlock<'a> {
             points: pack.records(id(kind::POINTS))?,
             triangles: if pack.contains(triangles) { pack.records(triangles)? } else { &[] },
             triangle_colors: if pack.contains(colors) { pack.records(colors)? } else { &[] },
+            calibration: Calibration::read(pack)?,
         };
         crate::validate(&block).map_err(|(kind, problem)| {
             PackError::invalid(pack.path(), SectionId::new(kind, 0), problem)
@@ -68,6 +74,21 @@ impl<'a> PointsBlock<'a> {
         size.length() * 0.5 * self.scale()
     }
 
+    /// What a pack's measured table is to be asked for this block before `camera`: its height in
+    /// pixels and the camera's elevation, both at the block's middle.
+    pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
+        let [min, max] = [self.header.min, self.header.max].map(DVec3::from_array);
+        let middle = self.to_world((min + max) * 0.5);
+        let distance = (middle - camera.eye).dot(camera.forward).max(f64::MIN_POSITIVE);
+        let height = (max - min).max_element() * self.scale() * camera.pixels_per_unit(distance);
+        Need {
+            representation: kind::POINTS_HEADER,
+            pixel_height: height as f32,
+            elevation: Some(camera.to_eye(middle).y.clamp(-1.0, 1.0).asin().to_degrees() as f32),
+            error,
+        }
+    }
+
     /// Position in block space of quantised steps in a cell.
     pub fn position(&self, cell: &CellRecord, steps: [u16; 3]) -> DVec3 {
         let step = f64::from(self.header.step_exponent).exp2();
@@ -75,6 +96,13 @@ impl<'a> PointsBlock<'a> {
         DVec3::from_array(std::array::from_fn(|k| {
             (f64::from(cell.origin[k]) + f64::from(steps[k]) * shifted) * step
         }))
+    }
+
+    /// Radius of a point as it is drawn, in block units.
+    #[inline]
+    pub fn radius(&self, point: &PointRecord) -> f64 {
+        let own = point.own();
+        self.calibration.as_ref().map_or(1.0, |c| c.radius_factor(own)) * own.radius()
     }
 
     /// The points of a cell.

@@ -46,6 +46,7 @@
 
 mod bake;
 mod block;
+mod calibration;
 mod header;
 mod materials;
 mod options;
@@ -60,6 +61,7 @@ pub use bake::audit::{CutAudit, audit};
 pub use bake::timing::{StageTimes, Stopwatch};
 pub use bake::{BakeError, BakeReport, bake};
 pub use block::PointsBlock;
+pub use calibration::Calibration;
 pub use header::{BakeCounts, CellRecord, PointsHeader};
 pub use materials::{read_materials, write_materials};
 pub use options::{BakeOptions, GridChoice, Order, RadiusRule, SurfelSize};

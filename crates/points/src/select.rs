@@ -41,6 +41,14 @@ pub struct Thresholds {
     pub depth_bias: PixelArea,
 }
 
+impl Thresholds {
+    /// Those of a level in a pack's measured table ([`forest_pack::measures::Measure::level`]).
+    pub fn of_level([finest, largest, depth_bias]: [f32; 3]) -> Self {
+        let area = |v: f32| PixelArea(f64::from(v));
+        Self { finest: area(finest), largest: area(largest), depth_bias: area(depth_bias) }
+    }
+}
+
 impl Default for Thresholds {
     /// Points of about a pixel, triangles above 16 pixels, no bias.
     fn default() -> Self {

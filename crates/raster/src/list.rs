@@ -145,6 +145,11 @@ impl<'a> DisplayList<'a> {
         Self { triangles: vec![], ellipses }
     }
 
+    /// The ellipses, to be changed.
+    pub fn ellipses_mut(&mut self) -> &mut [Ellipse] {
+        &mut self.ellipses
+    }
+
     /// Adds what is before the eye of a triangle of material `material`; nothing for a material
     /// that is not in `surfaces`, and nothing for corners that are not finite. `id` is its stable
     /// number for the hash rule of opacity.

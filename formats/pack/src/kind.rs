@@ -2,6 +2,8 @@
 
 /// What was baked from what: [`crate::header::Meta`].
 pub const META: u16 = 1;
+/// Measured errors and costs of all representations: [`crate::measures::Measures`].
+pub const MEASURES: u16 = 2;
 /// Header of the points representation (owner: `forest-points`).
 pub const POINTS_HEADER: u16 = 16;
 /// Cell table, 64 bytes a cell.
@@ -12,6 +14,8 @@ pub const POINTS: u16 = 18;
 pub const POINTS_TRIANGLES: u16 = 19;
 /// Vertex colours of those triangles, 12 bytes a triangle.
 pub const POINTS_TRIANGLE_COLORS: u16 = 20;
+/// Factors on the areas of points by size: 53 single-precision numbers.
+pub const POINTS_CALIBRATION: u16 = 21;
 /// Materials and the list of textures: [`crate::header::Materials`].
 pub const MATERIALS: u16 = 32;
 /// Texels of one texture, RGBA, 8 bits each; the index is the texture's number.
@@ -21,11 +25,13 @@ pub const TEXTURE: u16 = 33;
 pub fn name(kind: u16) -> String {
     match kind {
         META => "meta".into(),
+        MEASURES => "measures".into(),
         POINTS_HEADER => "points.header".into(),
         POINTS_CELLS => "points.cells".into(),
         POINTS => "points".into(),
         POINTS_TRIANGLES => "points.triangles".into(),
         POINTS_TRIANGLE_COLORS => "points.triangle-colors".into(),
+        POINTS_CALIBRATION => "points.calibration".into(),
         MATERIALS => "materials".into(),
         TEXTURE => "texture".into(),
         other => format!("kind-{other}"),

@@ -24,6 +24,7 @@ mod error;
 pub mod header;
 pub mod kind;
 mod layout;
+pub mod measures;
 mod reader;
 mod spool;
 mod writer;

@@ -1,0 +1,248 @@
+//! `forest-bake eval`.
+
+use crate::failure::Usage;
+use crate::output;
+use crate::source::{ImportArgs, LoadedSource};
+use anyhow::{Context, Result};
+use forest_draw::read_surfaces;
+use forest_eval::report::{self, Axis};
+use forest_eval::{
+    Baselines, Contender, Evaluation, Metric, Plan, Subject, Sweep, Truth, calibrate, machine,
+    measures, own_contenders, pictures, sweep,
+};
+use forest_pack::header::{self, Meta};
+use forest_pack::measures::Measures;
+use forest_pack::{Pack, PackWriter, SectionId, kind};
+use forest_points::{Calibration, PointsBlock};
+use forest_raster::{Light, Sampling, Style, Surfaces};
+use forest_soup::TriangleSoup;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Pack to judge.
+    #[arg(value_name = "PACK", required_unless_present = "schema")]
+    pack: Option<PathBuf>,
+    /// What it was baked from: the trees of the bake, as they were given to it.
+    #[arg(long, required_unless_present = "schema", num_args = 1.., value_name = "TREE")]
+    source: Vec<String>,
+    #[command(flatten)]
+    import: ImportArgs,
+    /// Sixteen views of 1024 to 4 pixels and thresholds in steps of two, instead of four views of
+    /// 256 to 4 pixels: takes an hour.
+    #[arg(long)]
+    full: bool,
+    /// Heights of the tree in pixels: the largest first, then divisors of it.
+    #[arg(long, value_delimiter = ',', value_name = "PX")]
+    heights: Vec<u32>,
+    /// Number of held-out views.
+    #[arg(long, value_name = "N")]
+    views: Option<u32>,
+    /// Thresholds s_m in square pixels.
+    #[arg(long, value_delimiter = ',', value_name = "PX2")]
+    s_m: Vec<f64>,
+    /// Samples a side of a pixel, at the largest height.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=16))]
+    samples: u32,
+    /// Light on the source (with shadows) and the levels (without).
+    #[arg(long, value_enum, default_value = "albedo")]
+    light: LightArg,
+    /// Judge the pack only, without the other ways.
+    #[arg(long)]
+    alone: bool,
+    /// Write the measured table into the pack.
+    #[arg(long)]
+    embed: bool,
+    /// Print JSON instead of a table; `eval --schema` prints its schema.
+    #[arg(long)]
+    json: bool,
+    /// Write one line a picture.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write a page with plots and pictures that needs no network.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Write the plot of FLIP against primitives at the second height.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Print the JSON schema of --json and stop.
+    #[arg(long)]
+    schema: bool,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum LightArg {
+    /// Base colours.
+    Albedo,
+    /// A sun and a sky.
+    Sun,
+}
+
+pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+    if args.schema {
+        return Ok(output::print(&forest_eval::json_schema())?);
+    }
+    let path = args.pack.as_deref().context("no pack")?;
+    let start = Instant::now();
+    let pack = Pack::open(path)?;
+    let source = args.import.load(&args.source, quiet)?;
+    refuse_other_source(&pack, &source)?;
+    let block = PointsBlock::open(&pack)?;
+    let plan = args.plan();
+    let judge = Judge::new(&source.soup, &plan, quiet);
+    let truth = judge.truth()?;
+    let pack_surfaces = read_surfaces(&pack, &block)?;
+    let baselines = if args.alone { None } else { Some(Baselines::new(&source.soup, &block)?) };
+    let blocks = baselines.as_ref().map(Baselines::blocks).transpose()?;
+    let contenders = match (&baselines, &blocks) {
+        (Some(b), Some(blocks)) => b.contenders(&block, pack_surfaces.as_ref(), blocks),
+        _ => own_contenders(&block, pack_surfaces.as_ref()),
+    };
+    let found = judge.sweep(&truth, &contenders)?;
+    let exhibits = match args.html {
+        Some(_) => report::gallery(&truth, &contenders, &plan, &found)?,
+        None => vec![],
+    };
+    if args.embed {
+        embed(&pack, &measures(&found, &plan), None)?;
+    }
+    let subject = subject(path, &pack, &block, &source, start.elapsed().as_secs_f64());
+    let evaluation = Evaluation::new(subject, &plan, &contenders, found);
+    if let Some(file) = &args.csv {
+        output::write_file(file, report::csv(&evaluation).as_bytes())?;
+    }
+    if let Some(file) = &args.html {
+        output::write_file(file, report::html(&evaluation, &exhibits)?.as_bytes())?;
+    }
+    if let Some(file) = &args.svg {
+        let height = plan.heights[1.min(plan.heights.len() - 1)];
+        let svg = report::plot(&evaluation, height, Metric::Flip, Axis::Primitives)?;
+        output::write_file(file, svg.as_bytes())?;
+    }
+    let text = if args.json {
+        serde_json::to_string_pretty(&evaluation)? + "\n"
+    } else {
+        report::text(&evaluation)?
+    };
+    Ok(output::print(&text)?)
+}
+
+impl Args {
+    fn plan(&self) -> Plan {
+        let mut plan = if self.full { Plan::full() } else { Plan::default() };
+        if !self.heights.is_empty() {
+            plan.heights.clone_from(&self.heights);
+        }
+        if !self.s_m.is_empty() {
+            plan.s_m.clone_from(&self.s_m);
+        }
+        plan.views = self.views.unwrap_or(plan.views);
+        plan.sampling = Sampling { side: self.samples, ..plan.sampling };
+        plan.light = match self.light {
+            LightArg::Albedo => Light::Albedo,
+            LightArg::Sun => Light::MORNING,
+        };
+        plan
+    }
+}
+
+/// A soup and how it is looked at.
+struct Judge<'a> {
+    soup: &'a TriangleSoup,
+    surfaces: Surfaces,
+    plan: &'a Plan,
+    quiet: bool,
+}
+
+impl<'a> Judge<'a> {
+    fn new(soup: &'a TriangleSoup, plan: &'a Plan, quiet: bool) -> Self {
+        Self { soup, surfaces: Surfaces::new(&soup.materials, &soup.textures), plan, quiet }
+    }
+
+    fn truth(&self) -> Result<Truth<'_>> {
+        let style = Style { sampling: self.plan.sampling, light: self.plan.light };
+        Ok(Truth::new(self.soup, &self.surfaces, style)?)
+    }
+
+    fn sweep(&self, truth: &Truth, contenders: &[Contender]) -> Result<Sweep> {
+        let bar = output::bar(pictures(self.plan, contenders), "pictures", self.quiet);
+        let found = sweep(truth, contenders, self.plan, &|n| bar.set_position(n))?;
+        bar.finish_and_clear();
+        Ok(found)
+    }
+}
+
+/// Calibrates and measures a pack that was just baked from `source`, and writes both into it.
+pub(crate) fn measure(path: &Path, soup: &TriangleSoup, quiet: bool) -> Result<()> {
+    let pack = Pack::open(path)?;
+    let mut block = PointsBlock::open(&pack)?;
+    let plan = Plan { views: 6, steps: 0, ..Plan::default() };
+    let judge = Judge::new(soup, &plan, quiet);
+    let truth = judge.truth()?;
+    let bar = output::bar(100, "calibration", quiet);
+    let found = calibrate(&truth, &block, &|share| bar.set_position((100.0 * share) as u64))?;
+    bar.finish_and_clear();
+    block.calibration = Some(found.calibration.clone());
+    let surfaces = read_surfaces(&pack, &block)?;
+    let mut contenders = own_contenders(&block, surfaces.as_ref());
+    // Depth bias gains nothing at equal error (see docs/REPORT.md): no level of the table has it.
+    contenders.truncate(1);
+    let table = measures(&judge.sweep(&truth, &contenders)?, &plan);
+    embed(&pack, &table, Some(&found.calibration))
+}
+
+/// Writes the pack anew with the table, and the calibration if there is a new one.
+fn embed(pack: &Pack, table: &Measures, calibration: Option<&Calibration>) -> Result<()> {
+    let mut writer = PackWriter::create(pack.path())?;
+    let replaced = |id: SectionId| {
+        id.kind == kind::MEASURES || (id.kind == kind::POINTS_CALIBRATION && calibration.is_some())
+    };
+    for (id, _) in pack.sections().filter(|(id, _)| !replaced(*id)) {
+        writer.copy(pack, id)?;
+    }
+    table.write(&mut writer)?;
+    if let Some(calibration) = calibration {
+        calibration.write(&mut writer)?;
+    }
+    Ok(writer.finish()?)
+}
+
+fn refuse_other_source(pack: &Pack, source: &LoadedSource) -> Result<()> {
+    let meta: Meta = header::decode(pack, SectionId::new(kind::META, 0))?;
+    if meta.source_hash == source.meta.source_hash {
+        return Ok(());
+    }
+    let known: Vec<&str> = meta.sources.iter().map(|s| s.name.as_str()).collect();
+    let name = pack.path().display();
+    Err(Usage(format!("{name}: was baked from another source ({})", known.join(", "))).into())
+}
+
+fn subject(
+    path: &Path,
+    pack: &Pack,
+    block: &PointsBlock,
+    source: &LoadedSource,
+    seconds: f64,
+) -> Subject {
+    let name = |p: &Path| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    // Folders are nobody's business in a report that is passed on.
+    let plain = |a: std::ffi::OsString| {
+        let text = a.to_string_lossy().into_owned();
+        if text.contains('/') { name(Path::new(&text)) } else { text }
+    };
+    Subject {
+        generator: source.meta.generator.clone(),
+        command: std::env::args_os().map(plain).collect::<Vec<_>>().join(" "),
+        pack: name(path),
+        pack_bytes: pack.file_length(),
+        calibrated: block.calibration.is_some(),
+        source: source.meta.sources.iter().map(|s| s.name.clone()).collect(),
+        triangles: source.soup.triangles.len() as u64,
+        points: block.points.len() as u64,
+        machine: machine(),
+        threads: rayon::current_num_threads() as u64,
+        seconds,
+        ..Subject::default()
+    }
+}

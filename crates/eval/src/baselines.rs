@@ -1,0 +1,182 @@
+//! The other ways: what the pack's source gives without this project's ideas, or with one of them.
+
+use crate::contender::{Contender, Look, Way};
+use crate::error::EvalError;
+use forest_pack::{Pack, PackWriter};
+use forest_points::{BakeOptions, GridChoice, Order, PointsBlock, RadiusRule, SurfelSize, bake};
+use forest_raster::Surfaces;
+use forest_soup::TriangleSoup;
+
+/// Packs and meshes that contenders draw.
+pub struct Baselines {
+    area: Pack,
+    paper: Pack,
+    clustering: Pack,
+    levels: Vec<(f64, TriangleSoup)>,
+    full: Vec<(f64, TriangleSoup)>,
+    surfaces: Surfaces,
+}
+
+/// Shares of triangles that the mesh simplifier is asked for.
+const MESH_SHARES: [f64; 6] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
+
+/// Ratio of k and s_m where the depth bias is on.
+pub(crate) const BIAS: f64 = 1.0;
+
+impl Baselines {
+    /// Bakes and simplifies `soup` with the surfels of `block`.
+    ///
+    /// # Errors
+    /// When a bake fails or the temporary folder cannot be written.
+    pub fn new(soup: &TriangleSoup, block: &PointsBlock) -> Result<Self, EvalError> {
+        let h = &block.header;
+        let same = BakeOptions {
+            grid: GridChoice::Fixed(h.grid),
+            surfel_size: if h.surfel_size.is_finite() {
+                SurfelSize::Units(h.surfel_size * block.scale())
+            } else {
+                SurfelSize::Triangle
+            },
+            alpha_tolerance: h.alpha_tolerance,
+            triangles: !block.triangles.is_empty(),
+            ..BakeOptions::default()
+        };
+        let whole = GridChoice::Fixed([1; 3]);
+        let area = BakeOptions { radius: RadiusRule::Area, ..same };
+        let paper = BakeOptions { radius: RadiusRule::Paper, order: Order::Paper, ..same };
+        Ok(Self {
+            area: baked(soup, &area)?,
+            paper: baked(soup, &paper)?,
+            clustering: baked(soup, &BakeOptions { grid: whole, ..area })?,
+            levels: MESH_SHARES.map(|share| (share, simplified(soup, share))).into(),
+            full: vec![(1.0, soup.clone())],
+            surfaces: Surfaces::new(&soup.materials, &soup.textures),
+        })
+    }
+
+    /// Opens the baked packs.
+    ///
+    /// # Errors
+    /// When a pack is not sound: that is a bug.
+    pub fn blocks(&self) -> Result<[PointsBlock<'_>; 3], EvalError> {
+        Ok([
+            PointsBlock::open(&self.area)?,
+            PointsBlock::open(&self.paper)?,
+            PointsBlock::open(&self.clustering)?,
+        ])
+    }
+
+    /// The pack's own contenders and all others. `surfaces` are those of the pack's triangles,
+    /// `None` if it has none.
+    pub fn contenders<'a>(
+        &'a self,
+        block: &'a PointsBlock<'a>,
+        surfaces: Option<&'a Surfaces>,
+        [area, paper, clustering]: &'a [PointsBlock<'a>; 3],
+    ) -> Vec<Contender<'a>> {
+        let points = |name, what, block, bias, look| Contender {
+            name,
+            what,
+            way: Way::Points { block, surfaces, bias, look },
+        };
+        let mut all = own_contenders(block, surfaces);
+        all.extend([
+            points(
+                "area",
+                "as pack, but clusters keep the sum of their surfels' areas, hidden or not",
+                area,
+                0.0,
+                Look::Translucent,
+            ),
+            points(
+                "opaque",
+                "as area, but points are opaque and as much smaller",
+                area,
+                0.0,
+                Look::Opaque,
+            ),
+            points(
+                "paper",
+                "radius and order of Gilet, Meyer, Neyret 2005, depth bias k = s_m",
+                paper,
+                BIAS,
+                Look::Translucent,
+            ),
+            points(
+                "clustering",
+                "uniform clustering of the whole block without a grid (after Pauly et al. 2002), \
+                 opaque points that keep their area",
+                clustering,
+                0.0,
+                Look::Opaque,
+            ),
+            Contender {
+                name: "random",
+                what: "a random part of the finest points, enlarged to keep their area (Cook et al. \
+                       2007)",
+                way: Way::RandomPoints { block },
+            },
+            Contender {
+                name: "simplify",
+                what: "triangles by meshoptimizer's simplify with pruning, no error limit",
+                way: Way::Meshes { levels: &self.levels, surfaces: &self.surfaces },
+            },
+            Contender {
+                name: "mesh",
+                what: "all triangles of the source",
+                way: Way::Meshes { levels: &self.full, surfaces: &self.surfaces },
+            },
+        ]);
+        all
+    }
+}
+
+/// The pack with and without depth bias.
+pub fn own_contenders<'a>(
+    block: &'a PointsBlock<'a>,
+    surfaces: Option<&'a Surfaces>,
+) -> Vec<Contender<'a>> {
+    let points = |name, what, bias| Contender {
+        name,
+        what,
+        way: Way::Points { block, surfaces, bias, look: Look::Translucent },
+    };
+    vec![
+        points("pack", "the pack as it is drawn by default, k = 0", 0.0),
+        points("biased", "the pack with depth bias k = s_m: coarser behind, finer in front", BIAS),
+    ]
+}
+
+fn baked(soup: &TriangleSoup, options: &BakeOptions) -> Result<Pack, EvalError> {
+    let dir = tempfile::tempdir().map_err(EvalError::Temporary)?;
+    let path = dir.path().join("baseline.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    bake(soup, options, &mut writer, &|_| {})?;
+    writer.finish()?;
+    // The map outlives the file's name.
+    Ok(Pack::open(&path)?)
+}
+
+/// What meshoptimizer keeps of each material's triangles when asked for `share` of them.
+fn simplified(soup: &TriangleSoup, share: f64) -> TriangleSoup {
+    let positions: &[u8] = bytemuck::cast_slice(&soup.positions);
+    let vertices = meshopt::VertexDataAdapter::new(positions, 12, 0).expect("12 bytes a position");
+    let finite = |t: &[u32; 3]| t.iter().all(|&v| soup.positions[v as usize].is_finite());
+    let (mut triangles, mut materials) = (Vec::new(), Vec::new());
+    for m in 0..soup.materials.len() as u16 {
+        let of_material = soup.triangles.iter().zip(&soup.triangle_materials);
+        let indices: Vec<u32> = of_material
+            .filter(|(t, material)| **material == m && finite(t))
+            .flat_map(|(t, _)| *t)
+            .collect();
+        if indices.is_empty() {
+            continue;
+        }
+        let target = (indices.len() as f64 / 3.0 * share).ceil() as usize * 3;
+        let options = meshopt::SimplifyOptions::Prune;
+        let kept = meshopt::simplify(&indices, &vertices, target, f32::MAX, options, None);
+        materials.extend(std::iter::repeat_n(m, kept.len() / 3));
+        triangles.extend(kept.as_chunks::<3>().0);
+    }
+    TriangleSoup { triangles, triangle_materials: materials, ..soup.clone() }
+}

@@ -1,0 +1,215 @@
+//! What is judged: the pack, and other ways to draw the same tree with fewer primitives.
+
+use forest_draw::point_ellipses;
+use forest_points::{Cut, PixelArea, PointsBlock, Thresholds, select_into};
+use forest_raster::{DisplayList, Ellipse, Picture, Style, Surfaces, draw, rasterize};
+use forest_soup::{Camera, TriangleSoup};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// s_M over s_m: points larger than that are drawn as triangles.
+pub(crate) const LARGEST_RATIO: f64 = 16.0;
+
+/// One way to draw a tree.
+pub struct Contender<'a> {
+    /// A short name.
+    pub name: &'static str,
+    /// What it is, in a sentence.
+    pub what: &'static str,
+    pub(crate) way: Way<'a>,
+}
+
+pub(crate) enum Way<'a> {
+    /// Points through `select`.
+    Points {
+        block: &'a PointsBlock<'a>,
+        surfaces: Option<&'a Surfaces>,
+        /// k over s_m.
+        bias: f64,
+        look: Look,
+    },
+    /// A random part of the finest points, enlarged to keep their area.
+    RandomPoints { block: &'a PointsBlock<'a> },
+    /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
+    Meshes { levels: &'a [(f64, TriangleSoup)], surfaces: &'a Surfaces },
+}
+
+/// How points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Look {
+    /// With their opacity.
+    Translucent,
+    /// Opaque and as much smaller.
+    Opaque,
+}
+
+/// The setting of a quality knob.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Knob {
+    /// Thresholds of a points pack, in square pixels.
+    Points {
+        /// Points smaller than this give way to their parent.
+        s_m: f64,
+        /// Points larger than this give way to triangles.
+        s_max: f64,
+        /// Depth bias.
+        k: f64,
+    },
+    /// Share of the primitives that is asked for.
+    Share(f64),
+}
+
+impl Knob {
+    /// The setting that means the same cut for a parallel camera under which the tree is `factor`
+    /// times as high.
+    pub(crate) fn nearer(self, factor: f64) -> Self {
+        match self {
+            Knob::Points { s_m, s_max, k } => {
+                let area = factor * factor;
+                Knob::Points { s_m: s_m * area, s_max: s_max * area, k: k * area }
+            }
+            Knob::Share(share) => Knob::Share(share),
+        }
+    }
+
+    /// As `select` wants it; `None` for a share.
+    pub fn thresholds(&self) -> Option<Thresholds> {
+        match *self {
+            Knob::Points { s_m, s_max, k } => Some(Thresholds {
+                finest: PixelArea(s_m),
+                largest: PixelArea(s_max),
+                depth_bias: PixelArea(k),
+            }),
+            Knob::Share(_) => None,
+        }
+    }
+}
+
+/// What a picture cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Cost {
+    /// Points and triangles drawn.
+    pub primitives: f64,
+    /// Bytes of records that a renderer looks at to draw them.
+    pub bytes: f64,
+    /// Time of `select` in nanoseconds (the median of five); null where nothing is selected.
+    pub select_ns: Option<f64>,
+    /// Time of the picture in milliseconds, by the renderer that the report names.
+    pub render_ms: f64,
+}
+
+/// Bytes of a triangle in an indexed mesh: three 32-bit indices and, at half a vertex a triangle,
+/// position, normal and texture coordinates of 32 bytes.
+const MESH_TRIANGLE_BYTES: f64 = 12.0 + 16.0;
+
+impl Contender<'_> {
+    /// The knob's settings for the sweep's values of s_m and shares, finest first.
+    pub(crate) fn knobs(&self, s_m: &[f64], shares: &[f64]) -> Vec<Knob> {
+        match &self.way {
+            Way::Points { bias, .. } => s_m
+                .iter()
+                .map(|&s| Knob::Points { s_m: s, s_max: LARGEST_RATIO * s, k: bias * s })
+                .collect(),
+            Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),
+            Way::Meshes { levels, .. } => levels.iter().map(|l| Knob::Share(l.0)).collect(),
+        }
+    }
+
+    /// Draws with `knob`, one of [`Contender::knobs`].
+    pub(crate) fn draw(&self, camera: &Camera, knob: Knob, style: &Style) -> (Picture, Cost) {
+        let start = Instant::now();
+        let (picture, mut cost) = match (&self.way, knob) {
+            (Way::Points { block, surfaces, look, .. }, knob) => {
+                let thresholds = knob.thresholds().expect("points have thresholds");
+                draw_points(block, *surfaces, camera, thresholds, *look, style)
+            }
+            (Way::RandomPoints { block }, Knob::Share(share)) => {
+                draw_random(block, camera, share, style)
+            }
+            (Way::Meshes { levels, surfaces }, Knob::Share(share)) => {
+                let (_, soup) = levels.iter().find(|l| l.0 == share).expect("a level");
+                let primitives = soup.triangles.len() as f64;
+                let cost = Cost {
+                    primitives,
+                    bytes: primitives * MESH_TRIANGLE_BYTES,
+                    select_ns: None,
+                    render_ms: 0.0,
+                };
+                (rasterize(soup, surfaces, camera, style), cost)
+            }
+            (_, Knob::Points { .. }) => unreachable!("only points have thresholds"),
+        };
+        cost.render_ms = start.elapsed().as_secs_f64() * 1e3;
+        if let (Way::Points { block, .. }, Some(t)) = (&self.way, knob.thresholds()) {
+            cost.select_ns = Some(select_ns(block, camera, &t));
+        }
+        (picture, cost)
+    }
+}
+
+/// Median of five runs into a warm cut.
+fn select_ns(block: &PointsBlock, camera: &Camera, t: &Thresholds) -> f64 {
+    let mut cut = Cut::default();
+    select_into(block, camera, t, &mut cut);
+    let mut runs: Vec<u128> = (0..5)
+        .map(|_| {
+            let start = Instant::now();
+            select_into(block, camera, t, &mut cut);
+            start.elapsed().as_nanos()
+        })
+        .collect();
+    runs.sort_unstable();
+    runs[2] as f64
+}
+
+fn draw_points(
+    block: &PointsBlock,
+    surfaces: Option<&Surfaces>,
+    camera: &Camera,
+    thresholds: Thresholds,
+    look: Look,
+    style: &Style,
+) -> (Picture, Cost) {
+    let mut frame = forest_draw::PointsFrame::new(block, surfaces, camera, &thresholds, style);
+    if look == Look::Opaque {
+        frame.ellipses().iter_mut().for_each(make_opaque);
+    }
+    let (drawn, bytes) = (frame.drawn(), frame.bytes() as f64);
+    let primitives = drawn.primitives() as f64;
+    (frame.draw(), Cost { primitives, bytes, select_ns: None, render_ms: 0.0 })
+}
+
+/// The same projected area without translucency.
+fn make_opaque(e: &mut Ellipse) {
+    e.radius *= (f64::from(e.opacity) / 255.0).sqrt();
+    e.opacity = u8::MAX;
+}
+
+/// R. Cook, J. Halstead, M. Planck, D. Ryu, "Stochastic simplification of aggregate detail",
+/// SIGGRAPH 2007, without its colour correction: keep a random `share`, scale areas by its inverse.
+fn draw_random(block: &PointsBlock, camera: &Camera, share: f64, style: &Style) -> (Picture, Cost) {
+    let all = Thresholds {
+        finest: PixelArea(0.0),
+        largest: PixelArea(f64::INFINITY),
+        depth_bias: PixelArea(0.0),
+    };
+    let cut = forest_points::select(block, camera, &all);
+    let mut ellipses = point_ellipses(block, &cut, camera, style);
+    // A stable order of chance: every smaller share is a part of every larger one.
+    ellipses.retain(|e| chance(e.id) < share);
+    ellipses.iter_mut().for_each(|e| e.radius /= share.sqrt());
+    let primitives = ellipses.len() as f64;
+    let bytes = primitives * size_of::<forest_points::PointRecord>() as f64;
+    let picture = draw(&DisplayList::of_ellipses(ellipses), camera, style);
+    (picture, Cost { primitives, bytes, select_ns: None, render_ms: 0.0 })
+}
+
+/// A number in `0..1` for each id, far from that of the hash rule of opacity.
+fn chance(id: u32) -> f64 {
+    let mut v =
+        u64::from(id).wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    v = (v ^ v >> 31).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((v ^ v >> 29) >> 11) as f64 / (1u64 << 53) as f64
+}

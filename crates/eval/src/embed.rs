@@ -1,0 +1,56 @@
+//! The measured table that a pack carries.
+
+use crate::evaluation::Summary;
+use crate::frame::Band;
+use crate::sweep::{Plan, Row, Sweep};
+use forest_pack::kind;
+use forest_pack::measures::{Light, Measure, Measures};
+
+/// The rows of the pack's own contenders (with and without depth bias), means by band of elevation.
+pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
+    let mut rows: Vec<Measure> = Vec::new();
+    for band in [Band::Level, Band::Oblique, Band::High] {
+        let mut groups: Vec<Vec<&Row>> = Vec::new();
+        for row in &sweep.rows {
+            let own = row.contender == "pack" || row.contender == "biased";
+            if !own || sweep.views[row.view as usize].band != band {
+                continue;
+            }
+            match groups.iter_mut().find(|g| g[0].knob == row.knob && g[0].height == row.height) {
+                Some(group) => group.push(row),
+                None => groups.push(vec![row]),
+            }
+        }
+        rows.extend(groups.iter().filter_map(|g| measure(&Summary::new(g), band, plan)));
+    }
+    let method = format!(
+        "{} held-out views, parallel, {} samples a pixel at {} px and more below, over linear grey {}",
+        plan.views,
+        plan.sampling.count(),
+        plan.heights[0],
+        crate::BACKGROUND,
+    );
+    Measures { method, rows }
+}
+
+fn measure(s: &Summary, band: Band, plan: &Plan) -> Option<Measure> {
+    let t = s.row.knob.thresholds()?;
+    Some(Measure {
+        representation: kind::POINTS_HEADER,
+        level: [t.finest.0, t.largest.0, t.depth_bias.0].map(|v| v as f32),
+        pixel_height: s.row.height as f32,
+        elevation: band.range(),
+        light: match plan.light {
+            forest_raster::Light::Albedo => Light::Albedo,
+            forest_raster::Light::Sun(_) => Light::Sun,
+        },
+        primitives: s.primitives as f32,
+        bytes: s.bytes as f32,
+        rmse: s.errors.rmse as f32,
+        rmse_worst: s.worst[1] as f32,
+        flip: s.errors.flip as f32,
+        flip_worst: s.worst[0] as f32,
+        ssim: s.errors.ssim as f32,
+        coverage: s.errors.coverage_ratio.unwrap_or(0.0) as f32,
+    })
+}
