@@ -205,7 +205,7 @@ fn chosen_levels_keep_their_promise() {
     let plan = Plan {
         heights: vec![128, 32],
         views: 6,
-        s_m: vec![0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0],
+        s_m: (-1..=9).map(f64::from).map(f64::exp2).collect(),
         steps: 0,
         ..Plan::default()
     };
