@@ -4,6 +4,7 @@
 #   make test     set up, format check, clippy, docs, all tests
 #   make check    format check, clippy and docs only
 #   make bench    measure bakes; writes docs/BENCH.md and docs/LEVELS.txt
+#   make report   evaluate the trees; writes docs/REPORT.md, the README's figures, out/report/*.html
 #   make picture  draw the README's picture anew
 #   make golden   write the golden packs anew, after a meant change of the format
 #   make samples  grow sample-data anew
@@ -14,7 +15,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: demo test check bench picture golden samples fuzz deny setup
+.PHONY: demo test check bench report picture golden samples fuzz deny setup
 
 # What the build needs from the system: a linker with C and C++ compilers, for zstd and meshoptimizer.
 setup:
@@ -62,6 +63,11 @@ bench: setup
 	target/release/bench > docs/BENCH.md.new && mv docs/BENCH.md.new docs/BENCH.md
 	target/release/forest-bake levels sample-data/conifer.glb > docs/LEVELS.txt
 	@cat docs/BENCH.md
+
+report: setup
+	$(CARGO) build --release --workspace --bins
+	target/release/report
+	target/release/forest-bake eval --schema > docs/eval.schema.json
 
 picture: setup
 	$(CARGO) build --release --workspace --bins

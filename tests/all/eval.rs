@@ -42,7 +42,7 @@ fn swept(soup: &TriangleSoup, plan: &Plan) -> Sweep {
     let truth = Truth::new(soup, &surfaces, style).unwrap();
     let baselines = Baselines::new(soup, &block).unwrap();
     let blocks = baselines.blocks().unwrap();
-    let contenders = baselines.contenders(&block, Some(&surfaces), &blocks);
+    let contenders = baselines.contenders(&block, None, Some(&surfaces), &blocks);
     sweep(&truth, &contenders, plan, &|_| {}).unwrap()
 }
 

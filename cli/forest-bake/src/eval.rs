@@ -95,8 +95,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let pack_surfaces = read_surfaces(&pack, &block)?;
     let baselines = if args.alone { None } else { Some(Baselines::new(&source.soup, &block)?) };
     let blocks = baselines.as_ref().map(Baselines::blocks).transpose()?;
+    let raw = Baselines::raw(&block);
     let contenders = match (&baselines, &blocks) {
-        (Some(b), Some(blocks)) => b.contenders(&block, pack_surfaces.as_ref(), blocks),
+        (Some(b), Some(blocks)) => {
+            b.contenders(&block, raw.as_ref(), pack_surfaces.as_ref(), blocks)
+        }
         _ => own_contenders(&block, pack_surfaces.as_ref()),
     };
     let found = judge.sweep(&truth, &contenders)?;

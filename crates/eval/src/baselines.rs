@@ -66,11 +66,17 @@ impl Baselines {
         ])
     }
 
-    /// The pack's own contenders and all others. `surfaces` are those of the pack's triangles,
+    /// The pack's block without its calibration, if it has one.
+    pub fn raw<'a>(block: &PointsBlock<'a>) -> Option<PointsBlock<'a>> {
+        block.calibration.is_some().then(|| PointsBlock { calibration: None, ..block.clone() })
+    }
+
+    /// The pack's own contenders and all others; `raw` is [`Baselines::raw`] of `block`. `surfaces` are those of the pack's triangles,
     /// `None` if it has none.
     pub fn contenders<'a>(
         &'a self,
         block: &'a PointsBlock<'a>,
+        raw: Option<&'a PointsBlock<'a>>,
         surfaces: Option<&'a Surfaces>,
         [area, paper, clustering]: &'a [PointsBlock<'a>; 3],
     ) -> Vec<Contender<'a>> {
@@ -80,10 +86,12 @@ impl Baselines {
             way: Way::Points { block, surfaces, bias, look },
         };
         let mut all = own_contenders(block, surfaces);
+        let what = "the pack without its calibration";
+        all.extend(raw.map(|raw| points("raw", what, raw, 0.0, Look::Translucent)));
         all.extend([
             points(
                 "area",
-                "as pack, but clusters keep the sum of their surfels' areas, hidden or not",
+                "as raw, but clusters keep the sum of their surfels' areas, hidden or not",
                 area,
                 0.0,
                 Look::Translucent,

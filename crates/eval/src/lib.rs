@@ -1,4 +1,48 @@
-//! eval
+//! How far a pack's levels are from their source, and what they cost.
+//!
+//! * **Metrics** ([`Comparison`], [`popping`]): RMSE, PSNR, SSIM, FLIP, coverage, silhouette, depth,
+//!   over the box that holds what either picture shows. Each is tested against another
+//!   implementation's values (`reference/metrics.py`).
+//! * **Sweeps** ([`sweep()`]): the pack and other ways to draw the tree ([`Baselines`]), over pixel
+//!   heights and held-out views, against the truth of [`forest_raster`]. One picture is drawn for
+//!   each cut, at the largest height, and box-filtered to the others, as the truth is.
+//! * **Ratios** ([`ratios`]): primitives at equal error, view by view.
+//! * **Calibration** ([`calibrate()`]): factors on the areas of points, so that every cut covers what
+//!   its source covers.
+//! * **The measured table** ([`measures`]): what a pack carries to choose levels by.
+//! * **Reports** ([`report`]): text, JSON ([`Evaluation`], a published schema), CSV, SVG, HTML.
+//!
+//! ```
+//! use forest_eval::{Plan, Truth, own_contenders, sweep};
+//! use forest_points::{BakeOptions, PointsBlock, bake};
+//! use forest_raster::{Style, Surfaces};
+//! use forest_soup::{Material, TriangleSoup};
+//! use glam::Vec3;
+//!
+//! // A fan of 40 leaves.
+//! let corner = |i: u32| Vec3::new((i as f32).cos(), i as f32 * 0.05, (i as f32).sin());
+//! let fan = TriangleSoup {
+//!     positions: (0..120).map(|i| if i % 3 == 0 { Vec3::Y } else { corner(i) }).collect(),
+//!     triangles: (0..40).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+//!     triangle_materials: vec![0; 40],
+//!     materials: vec![Material::default()],
+//!     ..TriangleSoup::default()
+//! };
+//! let dir = tempfile::tempdir().unwrap();
+//! let path = dir.path().join("fan.fpack");
+//! let mut writer = forest_pack::PackWriter::create(&path).unwrap();
+//! bake(&fan, &BakeOptions::default(), &mut writer, &|_| {}).unwrap();
+//! writer.finish().unwrap();
+//!
+//! let pack = forest_pack::Pack::open(&path).unwrap();
+//! let block = PointsBlock::open(&pack).unwrap();
+//! let surfaces = Surfaces::new(&fan.materials, &fan.textures);
+//! let truth = Truth::new(&fan, &surfaces, Style::default()).unwrap();
+//! let plan = Plan { heights: vec![64, 16], views: 1, ..Plan::default() };
+//! let found = sweep(&truth, &own_contenders(&block, None), &plan, &|_| {}).unwrap();
+//! // The finest cut is nearest to the truth.
+//! assert!(found.rows[0].errors.rmse < found.rows[4].errors.rmse);
+//! ```
 
 mod baselines;
 mod calibrate;

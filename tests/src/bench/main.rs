@@ -3,6 +3,7 @@
 //! own; runs of both programs alternate, because machines drift: compare ratios and medians.
 
 mod coverage;
+mod truth;
 
 use anyhow::{Context, Result, bail};
 use forest_import::{Block, Limits};
@@ -152,7 +153,12 @@ fn report() -> Result<()> {
         }
     }
     println!("# What a bake costs\n");
-    println!("{}, {} threads, {}.", machine()?, std::thread::available_parallelism()?, today()?);
+    println!(
+        "{}, {} threads, {}.",
+        forest_eval::machine(),
+        std::thread::available_parallelism()?,
+        today()?
+    );
     println!(
         "\n## Beside meshoptimizer: one surfel a triangle, all levels, against one level of 10 %\n"
     );
@@ -180,6 +186,7 @@ fn report() -> Result<()> {
         "Seconds by stage; those of surfels, cluster, sort and triangles are summed over threads.\n"
     );
     table(&full);
+    truth_report(&names)?;
     coverage_report(&names)?;
     println!("\n## Size: one surfel a triangle, points only\n");
     let mut sizes = Vec::new();
@@ -200,20 +207,62 @@ fn report() -> Result<()> {
     Ok(())
 }
 
+fn truth_report(names: &[String]) -> Result<()> {
+    println!("\n## Ground truth\n");
+    println!(
+        "Seconds of a picture of {0}×{0} pixels with 64 samples each that shows all of the tree; with a sun \
+         and a sky, both cast shadows. Metrics: milliseconds on the box of a tree {0} pixels high; the rest \
+         is RMSE, PSNR, coverage, silhouette and depth.\n",
+        truth::SIDE
+    );
+    println!(
+        "| tree | covers | scanlines | rays, albedo | rays / scanlines | hierarchy | rays, sun and sky | box | \
+         FLIP | SSIM | the rest |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for name in names {
+        let soup = soup(name)?;
+        let t = truth::truths(&soup)?;
+        let m = truth::metrics(&soup)?;
+        println!(
+            "| {} | {:.0} % | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {}×{} | {:.0} | {:.0} | {:.1} |",
+            short(name),
+            100.0 * t.coverage,
+            t.scanlines,
+            t.rays,
+            t.rays / t.scanlines,
+            t.hierarchy,
+            t.lit,
+            m.size[0],
+            m.size[1],
+            m.flip,
+            m.ssim,
+            m.rest
+        );
+    }
+    Ok(())
+}
+
 fn coverage_report(names: &[String]) -> Result<()> {
     println!("\n## Coverage of cuts\n");
     println!(
-        "Signed error of the mean coverage against the triangles' picture, over 16 views, with the \
-         worst view in brackets; points of each cut. Pictures of {0}×{0} pixels, 64 samples each.\n",
-        coverage::SIDE
+        "Signed error of the mean coverage against the source's picture, over 16 views that neither bakes \
+         nor calibrations know, with the worst view in brackets; points of each cut. Trees {} pixels \
+         high, 64 samples a pixel.\n",
+        coverage::HEIGHT
     );
     let cuts: Vec<String> = coverage::CUTS.iter().map(|c| format!("s_m {c} px²")).collect();
     println!("| tree | radius | {} |", cuts.join(" | "));
     println!("|---|---|{}", "---|".repeat(cuts.len()));
     for name in names {
         let soup = soup(name)?;
-        for radius in [RadiusRule::Opacity, RadiusRule::Area, RadiusRule::Paper] {
-            let rows = coverage::measure(&soup, radius)?;
+        for (radius, calibrated) in [
+            (RadiusRule::Opacity, true),
+            (RadiusRule::Opacity, false),
+            (RadiusRule::Area, false),
+            (RadiusRule::Paper, false),
+        ] {
+            let rows = coverage::measure(&soup, radius, calibrated)?;
             let cells: Vec<String> = rows
                 .iter()
                 .map(|r| {
@@ -221,7 +270,8 @@ fn coverage_report(names: &[String]) -> Result<()> {
                     format!("{mean:+.1} % ({worst:+.1}), {}", r.points)
                 })
                 .collect();
-            println!("| {} | {radius:?} | {} |", short(name), cells.join(" | "));
+            let rule = if calibrated { "calibrated" } else { "" };
+            println!("| {} | {radius:?} {rule} | {} |", short(name), cells.join(" | "));
         }
     }
     Ok(())
@@ -265,12 +315,6 @@ fn median(mut v: Vec<f64>) -> f64 {
 
 fn short(name: &str) -> String {
     Path::new(name).file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-fn machine() -> Result<String> {
-    let info = std::fs::read_to_string("/proc/cpuinfo")?;
-    let model = info.lines().find_map(|l| l.strip_prefix("model name")).unwrap_or(": a processor");
-    Ok(model.trim_start_matches([' ', '\t', ':']).to_string())
 }
 
 fn today() -> Result<String> {

@@ -64,13 +64,18 @@ impl Comparison {
         Errors {
             rmse,
             psnr: (rmse > 0.0).then(|| -20.0 * rmse.log10()),
-            ssim: ssim::ssim(a, b, background),
+            ssim: self.ssim(background),
             flip: self.flip(background).mean(),
             coverage: pixels::coverage(a, b),
             coverage_ratio: pixels::coverage_ratio(a, b),
             silhouette_iou: pixels::silhouette_iou(a, b),
             depth: pixels::depth(a, b).map(|d| d / depth_unit),
         }
+    }
+
+    /// Structural similarity alone.
+    pub fn ssim(&self, background: f32) -> f64 {
+        ssim::ssim(&self.truth, &self.test, background)
     }
 
     /// FLIP pixel by pixel.

@@ -34,10 +34,11 @@ impl Axis {
     }
 }
 
-/// Distinct for people who see red and green alike (after P. Green-Armytage's and M. Okabe's sets).
-const COLORS: [RGBColor; 9] = [
+/// Distinct for people who see red and green alike (after M. Okabe and K. Ito's set).
+const COLORS: [RGBColor; 10] = [
     RGBColor(0, 0, 0),
     RGBColor(86, 180, 233),
+    RGBColor(170, 68, 255),
     RGBColor(230, 159, 0),
     RGBColor(240, 228, 66),
     RGBColor(204, 121, 167),
