@@ -1,6 +1,7 @@
 //! The ground truth: two ways that must agree, and an independent renderer's pictures.
 
 use crate::support::{repo, shared};
+use forest_eval::{Comparison, Frame};
 use forest_import::{Block, Limits};
 use forest_raster::{Light, Picture, RayScene, Sampling, Style, Sun, Surfaces, rasterize};
 use forest_soup::{Camera, Projection, TriangleSoup, srgb8_to_linear};
@@ -13,24 +14,16 @@ fn soup(path: &Path) -> TriangleSoup {
     block.load(&Limits::default()).unwrap().model.flatten(10_000_000).unwrap()
 }
 
-fn mean_square(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
-    let pairs = a.as_flattened().iter().zip(b.as_flattened());
-    pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / (4 * a.len()) as f64
-}
-
-/// Looks at all of a soup along `forward`.
-fn overview(soup: &TriangleSoup, forward: DVec3, projection: &str, side: u32) -> Camera {
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for p in soup.positions.iter().filter(|p| p.is_finite()) {
-        (min, max) = (min.min(p.as_dvec3()), max.max(p.as_dvec3()));
-    }
-    let (center, radius) = (soup.origin + (min + max) * 0.5, (max - min).length() * 0.5);
+/// A camera that looks at all of a soup along `forward`, and the soup's radius.
+fn overview(soup: &TriangleSoup, forward: DVec3, projection: &str, side: u32) -> (Camera, f64) {
+    let frame = Frame::of(soup).unwrap();
     let forward = forward.normalize();
     let projection = match projection {
-        "parallel" => Projection::Orthographic { height: 2.0 * radius },
+        "parallel" => Projection::Orthographic { height: 2.0 * frame.radius },
         _ => Projection::Perspective { fov_y: 1.0 },
     };
-    Camera::new(center - forward * (2.2 * radius), forward, projection, [side; 2])
+    let eye = frame.center - forward * (2.2 * frame.radius);
+    (Camera::new(eye, forward, projection, [side; 2]), frame.radius)
 }
 
 fn two_ways(soup: &TriangleSoup, camera: &Camera, sampling: Sampling) -> [Picture; 2] {
@@ -64,23 +57,23 @@ fn scanlines_and_rays_agree_on_every_tree() {
         for (projection, forward) in
             [("parallel", DVec3::new(-0.3, -0.4, -0.8)), ("perspective", DVec3::new(0.9, 0.2, 0.1))]
         {
-            let camera = overview(&soup, forward, projection, 96);
+            let (camera, radius) = overview(&soup, forward, projection, 96);
             let [a, b] = two_ways(&soup, &camera, Sampling { side: 4, seed: 3 });
-            let rmse = mean_square(&a.pixels, &b.pixels).sqrt();
+            // Over the box of the tree: empty background dilutes nothing.
+            let rmse = Comparison::new(&a, &b).pixel_errors(1.0).rmse;
             let name = tree.file_name().unwrap().to_string_lossy();
             let _ = writeln!(std::io::stderr(), "{name}, {projection}: RMSE {rmse:.5}");
             assert!(a.mean_coverage() > 0.02, "{name}: nothing to see");
             assert!(rmse <= 0.01, "{name}, {projection}: {rmse}");
-            let both = a.depth.iter().zip(&b.depth).zip(&a.pixels).zip(&b.pixels);
-            let (mut error, mut n) = (0.0, 0);
-            for (((da, db), pa), pb) in both {
-                if pa[3] == 1.0 && pb[3] == 1.0 {
-                    error += f64::from(da - db).abs();
-                    n += 1;
-                }
-            }
-            let size = camera.eye.distance(soup.origin);
-            assert!(n == 0 || error / f64::from(n) < 2e-3 * size, "{name}: depth {error} of {n}");
+            let errors = Comparison::new(&a, &b).pixel_errors(radius);
+            let depth = errors.depth.expect("pixels that both cover");
+            assert!(depth < 0.02, "{name}, {projection}: depths differ by {depth} radii");
+            let turned =
+                a.normal.iter().zip(&b.normal).map(|(a, b)| {
+                    a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>()
+                });
+            let turned = (turned.sum::<f64>() / a.normal.len() as f64).sqrt();
+            assert!(turned < 0.01, "{name}, {projection}: normals differ by {turned}");
         }
     }
 }
@@ -139,17 +132,19 @@ const REFERENCES: [(&str, &str); 5] = [
 ];
 const VIEWS: [&str; 4] = ["front", "right", "diag45", "top"];
 
-/// How a picture compares with the reference: mean coverage, largest difference of a mean colour
-/// channel (premultiplied), RMSE after a 4×4 box filter.
+/// How a picture compares with the reference over the box of both: mean coverage, largest difference
+/// of a mean colour channel (premultiplied), RMSE after a 4×4 box filter.
 fn against(reference: &[[f32; 4]], ours: &Picture) -> [f64; 3] {
     let theirs = Picture { pixels: reference.to_vec(), ..ours.clone() };
+    let whole = Comparison::new(&theirs, ours);
+    let (theirs_cropped, ours_cropped) = whole.pictures();
     let mean = |p: &Picture, c: usize| {
         p.pixels.iter().map(|v| f64::from(v[c])).sum::<f64>() / p.pixels.len() as f64
     };
-    let difference = |c| mean(ours, c) - mean(&theirs, c);
+    let difference = |c| mean(ours_cropped, c) - mean(theirs_cropped, c);
     let colour = (0..3).map(|c| difference(c).abs()).fold(0.0, f64::max);
-    let (a, b) = (ours.box_filtered(4), theirs.box_filtered(4));
-    [difference(3), colour, mean_square(&a.pixels, &b.pixels).sqrt()]
+    let filtered = Comparison::new(&theirs.box_filtered(4), &ours.box_filtered(4));
+    [difference(3), colour, filtered.pixel_errors(1.0).rmse]
 }
 
 #[test]

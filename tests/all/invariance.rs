@@ -35,6 +35,24 @@ fn one_two_and_eight_threads_write_the_same_bytes() {
     }
 }
 
+/// What is measured is a part of the pack as everything else.
+#[test]
+fn measured_packs_do_not_depend_on_threads_either() {
+    let dir = tempfile::tempdir().unwrap();
+    let measured = |threads: &str| {
+        let pack = arg(&dir.path().join(format!("{threads}.fpack")));
+        let source = arg(&repo("sample-data/shrub.obj"));
+        let size = ["--surfel-size", "0.1", "--measure"];
+        succeed(
+            &[&["points", &source, "-o", &pack, "--threads", threads, "-q"], &size[..]].concat(),
+        );
+        std::fs::read(pack).unwrap()
+    };
+    assert!(measured("1") == measured("3"));
+    let left: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(left.len(), 2, "{left:?}");
+}
+
 #[test]
 fn a_block_moved_by_its_nodes_bakes_to_the_same_payload() {
     let tree = |offset: DVec3| {

@@ -1,8 +1,10 @@
 //! The golden packs: what they are made of. `make golden` writes them; tests only read them.
 
-use crate::bake_bytes;
 use crate::soups::{leaves, texture, textured};
-use forest_points::{BakeOptions, GridChoice, Order, RadiusRule, SurfelSize};
+use crate::{bake_bytes, open};
+use forest_pack::measures::{Light, Measure, Measures};
+use forest_pack::{PackError, PackWriter, kind};
+use forest_points::{BakeOptions, Calibration, GridChoice, Order, RadiusRule, SurfelSize};
 use forest_soup::{AlphaMode, TriangleSoup};
 use std::path::PathBuf;
 
@@ -12,6 +14,8 @@ pub struct Golden {
     pub name: &'static str,
     soup: TriangleSoup,
     options: BakeOptions,
+    /// With a calibration and a measured table, both made up.
+    measured: bool,
 }
 
 /// No golden pack is larger.
@@ -28,8 +32,49 @@ impl Golden {
     /// # Panics
     /// When it cannot be baked: that is a bug.
     pub fn bake(&self) -> Vec<u8> {
-        bake_bytes(&self.soup, &self.options).expect("a golden soup bakes").0
+        let bytes = bake_bytes(&self.soup, &self.options).expect("a golden soup bakes").0;
+        if self.measured { with_measures(&bytes).expect("a golden pack") } else { bytes }
     }
+}
+
+/// The pack with a calibration and a measured table.
+fn with_measures(bytes: &[u8]) -> Result<Vec<u8>, PackError> {
+    let pack = open(bytes)?;
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    for (id, _) in pack.sections() {
+        writer.copy(&pack, id)?;
+    }
+    let factors = std::array::from_fn(|i| 0.9 + i as f32 / 256.0);
+    Calibration::new(factors).write(&mut writer)?;
+    let row = |s_m: f32, pixel_height: f32, elevation: [f32; 2]| Measure {
+        representation: kind::POINTS_HEADER,
+        level: [s_m, 16.0 * s_m, 0.0],
+        pixel_height,
+        elevation,
+        light: Light::Albedo,
+        primitives: 512.0 / s_m,
+        bytes: 8192.0 / s_m,
+        rmse: 0.03125,
+        rmse_worst: 0.0625,
+        flip: 0.046875 * s_m,
+        flip_worst: 0.0625 * s_m,
+        ssim: 0.875,
+        coverage: -0.0078125,
+    };
+    let rows = [64.0, 16.0]
+        .into_iter()
+        .flat_map(|h| [row(1.0, h, [-6.0, 20.0]), row(4.0, h, [-6.0, 20.0])])
+        .collect();
+    Measures { method: "made up".into(), rows }.write(&mut writer)?;
+    writer.finish()?;
+    Ok(std::fs::read(&path).expect("the pack that was just written"))
+}
+
+/// The golden pack with the most kinds of sections.
+pub fn richest() -> Golden {
+    all().pop().expect("there are golden packs")
 }
 
 /// All golden packs.
@@ -51,8 +96,14 @@ pub fn all() -> Vec<Golden> {
             name: "textured.fpack",
             soup: textured(leaves(150, 0.2, 1), leaf, mask),
             options: cut,
+            measured: false,
         },
-        Golden { name: "vertex-colours.fpack", soup: colored, options: cut },
+        Golden {
+            name: "vertex-colours.fpack",
+            soup: colored.clone(),
+            options: cut,
+            measured: false,
+        },
         Golden {
             name: "paper.fpack",
             soup: leaves(300, 0.1, 3),
@@ -62,11 +113,14 @@ pub fn all() -> Vec<Golden> {
                 triangles: false,
                 ..cut
             },
+            measured: false,
         },
         Golden {
             name: "one-triangle.fpack",
             soup: leaves(1, 0.5, 4),
             options: BakeOptions { surfel_size: SurfelSize::Triangle, ..cut },
+            measured: false,
         },
+        Golden { name: "measured.fpack", soup: colored, options: cut, measured: true },
     ]
 }

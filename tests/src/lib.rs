@@ -5,7 +5,7 @@ pub mod soups;
 
 use forest_draw::{draw_points, read_surfaces};
 use forest_pack::header::{self, Meta};
-use forest_pack::measures::{ErrorKind, Measures, Need};
+use forest_pack::measures::{ErrorKind, Light, Measures, Need};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::{
     BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, select,
@@ -51,8 +51,13 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
     if let Some(table) = Measures::read(&pack)? {
-        let (representation, error) = (kind::POINTS_HEADER, ErrorKind::Flip);
-        let need = Need { representation, pixel_height: 50.0, elevation: Some(9.0), error };
+        let need = Need {
+            representation: kind::POINTS_HEADER,
+            pixel_height: 50.0,
+            elevation: Some(9.0),
+            light: Light::Albedo,
+            error: ErrorKind::Flip,
+        };
         table.cheapest(&need, 0.1).or(table.best_within(&need, 1e3));
     }
     let block = PointsBlock::open(&pack)?;

@@ -1,13 +1,14 @@
 //! `forest-bake draw`.
 
 use crate::failure::Usage;
+use crate::light::LightArg;
 use crate::output;
 use anyhow::Result;
 use forest_draw::{draw_points, read_surfaces};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds};
-use forest_raster::{Light, Picture, Sampling, Style};
+use forest_raster::{Picture, Sampling, Style};
 use forest_soup::{Camera, Projection};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
@@ -41,14 +42,14 @@ pub(crate) struct Args {
     /// k, added to both at the back of the block and taken from them at its front.
     #[arg(long, default_value_t = 0.0, value_name = "PX2", allow_hyphen_values = true)]
     bias: f64,
-    /// Choose the cheapest level whose FLIP error is at most this, by the pack's measured table
-    /// (`points --measure`).
+    /// Choose the cheapest level whose FLIP error under base colours is at most this, by the pack's
+    /// measured table (`points --measure`).
     #[arg(long, value_name = "FLIP", conflicts_with_all = ["finest", "largest", "bias", "budget"])]
     error: Option<f32>,
     /// Choose the best level with at most this many primitives, by the measured table.
     #[arg(long, value_name = "N", conflicts_with_all = ["finest", "largest", "bias"])]
     budget: Option<f32>,
-    /// Light.
+    /// Light, without shadows.
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
     /// Samples a side of a pixel.
@@ -57,14 +58,6 @@ pub(crate) struct Args {
     /// Straight alpha instead of a grey background.
     #[arg(long)]
     alpha: bool,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum LightArg {
-    /// Base colours.
-    Albedo,
-    /// A sun from the left and light from everywhere; no shadows.
-    Sun,
 }
 
 /// Linear grey behind the tree.
@@ -80,11 +73,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let block = PointsBlock::open(&pack)?;
     let surfaces = read_surfaces(&pack, &block)?;
     let camera = args.camera(&block)?;
-    let light = match args.light {
-        LightArg::Albedo => Light::Albedo,
-        LightArg::Sun => Light::MORNING,
-    };
-    let style = Style { sampling: Sampling { side: args.samples, seed: 1 }, light };
+    let style =
+        Style { sampling: Sampling { side: args.samples, seed: 1 }, light: args.light.light() };
     let mut pictures = Vec::new();
     for thresholds in args.levels(&pack, &block, &camera, quiet)? {
         let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, &style);
@@ -130,9 +120,11 @@ impl Args {
             None => table.best_within(&need, limit),
         };
         let Some(choice) = choice else {
-            let best = table.cheapest(&need, f32::INFINITY).map_or(0.0, |c| c.primitives);
+            let least = table.best_within(&need, f32::INFINITY).map_or(f32::NAN, |c| c.error);
+            let fewest = table.cheapest(&need, f32::INFINITY).map_or(f32::NAN, |c| c.primitives);
             let problem = format!(
-                "no measured level does that at {:.0} pixels (the smallest draws {best:.0} primitives)",
+                "no measured level does that at {:.0} pixels (the least FLIP is {least:.4}, the fewest \
+                 primitives {fewest:.0})",
                 need.pixel_height
             );
             return Err(Usage(format!("{name}: {problem}")).into());
@@ -142,6 +134,12 @@ impl Args {
                 "chosen at {:.0} pixels: FLIP at most {:.4}, about {:.0} primitives",
                 need.pixel_height, choice.error, choice.primitives
             );
+            if choice.beyond {
+                eprintln!(
+                    "warning: {name}: not measured at this height or elevation: these are the figures \
+                     of the nearest (see `forest-bake inspect`)"
+                );
+            }
         }
         Ok(vec![Thresholds::of_level(choice.level)])
     }

@@ -1,6 +1,7 @@
 //! `forest-bake eval`.
 
 use crate::failure::Usage;
+use crate::light::LightArg;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource};
 use anyhow::{Context, Result};
@@ -14,7 +15,7 @@ use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackWriter, SectionId, kind};
 use forest_points::{Calibration, PointsBlock};
-use forest_raster::{Light, Sampling, Style, Surfaces};
+use forest_raster::{Sampling, Style, Surfaces};
 use forest_soup::TriangleSoup;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -71,25 +72,18 @@ pub(crate) struct Args {
     schema: bool,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum LightArg {
-    /// Base colours.
-    Albedo,
-    /// A sun and a sky.
-    Sun,
-}
-
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     if args.schema {
         return Ok(output::print(&forest_eval::json_schema())?);
     }
     let path = args.pack.as_deref().context("no pack")?;
+    let plan = args.plan();
+    plan.check()?;
     let start = Instant::now();
     let pack = Pack::open(path)?;
     let source = args.import.load(&args.source, quiet)?;
     refuse_other_source(&pack, &source)?;
     let block = PointsBlock::open(&pack)?;
-    let plan = args.plan();
     let judge = Judge::new(&source.soup, &plan, quiet);
     let truth = judge.truth()?;
     let pack_surfaces = read_surfaces(&pack, &block)?;
@@ -108,7 +102,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         None => vec![],
     };
     if args.embed {
-        embed(&pack, &measures(&found, &plan), None)?;
+        embed(&pack, path, &measures(&found, &plan), None)?;
     }
     let subject = subject(path, &pack, &block, &source, start.elapsed().as_secs_f64());
     let evaluation = Evaluation::new(subject, &plan, &contenders, found);
@@ -142,10 +136,7 @@ impl Args {
         }
         plan.views = self.views.unwrap_or(plan.views);
         plan.sampling = Sampling { side: self.samples, ..plan.sampling };
-        plan.light = match self.light {
-            LightArg::Albedo => Light::Albedo,
-            LightArg::Sun => Light::MORNING,
-        };
+        plan.light = self.light.light();
         plan
     }
 }
@@ -176,35 +167,44 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Calibrates and measures a pack that was just baked from `source`, and writes both into it.
-pub(crate) fn measure(path: &Path, soup: &TriangleSoup, quiet: bool) -> Result<()> {
-    let pack = Pack::open(path)?;
+/// Calibrates and measures `pack`, just baked from `soup`, and writes it with both to `target`.
+pub(crate) fn measure(pack: &Path, target: &Path, soup: &TriangleSoup, quiet: bool) -> Result<()> {
+    let pack = Pack::open(pack)?;
     let mut block = PointsBlock::open(&pack)?;
-    let plan = Plan { views: 6, steps: 0, ..Plan::default() };
+    let plan = Plan { views: 9, steps: 0, ..Plan::default() };
     let judge = Judge::new(soup, &plan, quiet);
     let truth = judge.truth()?;
     let bar = output::bar(100, "calibration", quiet);
-    let found = calibrate(&truth, &block, &|share| bar.set_position((100.0 * share) as u64))?;
+    let found = calibrate(&truth, &block, &|share| bar.set_position((100.0 * share) as u64))
+        .with_context(|| target.display().to_string())?;
     bar.finish_and_clear();
     block.calibration = Some(found.calibration.clone());
     let surfaces = read_surfaces(&pack, &block)?;
     let mut contenders = own_contenders(&block, surfaces.as_ref());
-    // Depth bias gains nothing at equal error (see docs/REPORT.md): no level of the table has it.
+    // Without depth bias: on most trees it gains nothing at equal error (docs/REPORT.md). A table
+    // with it comes from `eval --embed`.
     contenders.truncate(1);
     let table = measures(&judge.sweep(&truth, &contenders)?, &plan);
-    embed(&pack, &table, Some(&found.calibration))
+    embed(&pack, target, &table, Some(&found.calibration))
 }
 
-/// Writes the pack anew with the table, and the calibration if there is a new one.
-fn embed(pack: &Pack, table: &Measures, calibration: Option<&Calibration>) -> Result<()> {
-    let mut writer = PackWriter::create(pack.path())?;
+/// Writes the pack to `target` with the table, whose rows replace those of the same representation
+/// and light, and the calibration if there is a new one.
+fn embed(
+    pack: &Pack,
+    target: &Path,
+    table: &Measures,
+    calibration: Option<&Calibration>,
+) -> Result<()> {
+    let mut writer = PackWriter::create(target)?;
     let replaced = |id: SectionId| {
         id.kind == kind::MEASURES || (id.kind == kind::POINTS_CALIBRATION && calibration.is_some())
     };
     for (id, _) in pack.sections().filter(|(id, _)| !replaced(*id)) {
         writer.copy(pack, id)?;
     }
-    table.write(&mut writer)?;
+    let known = Measures::read(pack)?.unwrap_or_default();
+    known.merged(table).write(&mut writer)?;
     if let Some(calibration) = calibration {
         calibration.write(&mut writer)?;
     }

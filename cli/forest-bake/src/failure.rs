@@ -53,7 +53,7 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
             EvalError::Temporary(_) => 2,
             EvalError::Pack(e) => pack(e),
             EvalError::Bake(e) => bake(e),
-            EvalError::Soup(_) | EvalError::NothingToSee => 3,
+            EvalError::Soup(_) | EvalError::NothingToSee | EvalError::Unseen { .. } => 3,
             _ => 4,
         });
     }

@@ -7,6 +7,8 @@ use forest_pack::measures::{Measure, Measures};
 use forest_pack::{Codec, Pack, SectionId, kind};
 use forest_points::{BakeCounts, PointsBlock};
 use serde::Serialize;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -30,14 +32,7 @@ struct Report {
     sources: Vec<SourceReport>,
     sections: Vec<SectionReport>,
     points: Option<PointsReport>,
-    measures: Option<MeasuresReport>,
-}
-
-/// The measured table.
-#[derive(Serialize)]
-struct MeasuresReport {
-    method: String,
-    rows: Vec<Measure>,
+    measures: Option<Measures>,
 }
 
 #[derive(Serialize)]
@@ -115,8 +110,6 @@ impl Report {
         } else {
             None
         };
-        let measures =
-            Measures::read(pack)?.map(|Measures { method, rows }| MeasuresReport { method, rows });
         Ok(Self {
             schema: "forest-bake/inspect/1",
             file: pack.path().into(),
@@ -126,7 +119,7 @@ impl Report {
             sources,
             sections,
             points,
-            measures,
+            measures: Measures::read(pack)?,
         })
     }
 
@@ -148,7 +141,7 @@ impl Report {
             p.text(&mut t)?;
         }
         if let Some(m) = &self.measures {
-            m.text(&mut t)?;
+            measures_text(m, &mut t)?;
         }
         writeln!(t, "sections")?;
         for s in &self.sections {
@@ -165,41 +158,39 @@ impl Report {
     }
 }
 
-impl MeasuresReport {
-    /// A line a level and height: means over the bands of elevation, the worst of their errors.
-    fn text(&self, t: &mut String) -> std::fmt::Result {
-        writeln!(t, "measured: {}", self.method)?;
+/// A line a light, height and level: means over the bands of elevation, the worst of their errors.
+fn measures_text(m: &Measures, t: &mut String) -> std::fmt::Result {
+    writeln!(t, "measured: {}", m.method)?;
+    writeln!(
+        t,
+        "  {:>6} {:>6} {:>10} {:>8} {:>11} {:>8} {:>8} {:>9}",
+        "light", "height", "s_m, px²", "k, px²", "primitives", "FLIP ≤", "RMSE ≤", "coverage"
+    )?;
+    let mut lines: BTreeMap<_, Vec<&Measure>> = BTreeMap::new();
+    for r in m.rows.iter().filter(|r| r.representation == kind::POINTS_HEADER) {
+        // Positive floats sort as their bits do; tall pictures first.
+        let height = Reverse(r.pixel_height.to_bits());
+        let key = (r.light as u8, height, r.level.map(f32::to_bits));
+        lines.entry(key).or_default().push(r);
+    }
+    for same in lines.values() {
+        let mean =
+            |of: fn(&Measure) -> f32| same.iter().map(|r| of(r)).sum::<f32>() / same.len() as f32;
+        let worst = |of: fn(&Measure) -> f32| same.iter().map(|r| of(r)).fold(0.0, f32::max);
         writeln!(
             t,
-            "  {:>6} {:>10} {:>11} {:>8} {:>8} {:>9}",
-            "height", "s_m, px²", "primitives", "FLIP ≤", "RMSE ≤", "coverage"
+            "  {:>6} {:>6} {:>10} {:>8} {:>11} {:>8.4} {:>8.4} {:>8.1}%",
+            format!("{:?}", same[0].light).to_lowercase(),
+            same[0].pixel_height,
+            same[0].level[0],
+            same[0].level[2],
+            output::count(mean(|r| r.primitives) as u64),
+            worst(|r| r.flip_worst),
+            worst(|r| r.rmse_worst),
+            100.0 * mean(|r| r.coverage)
         )?;
-        let mut told: Vec<(f32, [f32; 3])> = Vec::new();
-        for r in &self.rows {
-            let key = (r.pixel_height, r.level);
-            if told.contains(&key) {
-                continue;
-            }
-            told.push(key);
-            let same: Vec<&Measure> =
-                self.rows.iter().filter(|o| (o.pixel_height, o.level) == key).collect();
-            let mean = |of: fn(&Measure) -> f32| {
-                same.iter().map(|r| of(r)).sum::<f32>() / same.len() as f32
-            };
-            let worst = |of: fn(&Measure) -> f32| same.iter().map(|r| of(r)).fold(0.0, f32::max);
-            writeln!(
-                t,
-                "  {:>6} {:>10} {:>11} {:>8.4} {:>8.4} {:>8.1}%",
-                r.pixel_height,
-                r.level[0],
-                output::count(mean(|r| r.primitives) as u64),
-                worst(|r| r.flip_worst),
-                worst(|r| r.rmse_worst),
-                100.0 * mean(|r| r.coverage)
-            )?;
-        }
-        Ok(())
     }
+    Ok(())
 }
 
 impl PointsReport {

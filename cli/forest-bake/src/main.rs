@@ -5,6 +5,7 @@ mod eval;
 mod failure;
 mod inspect;
 mod levels;
+mod light;
 mod output;
 mod points;
 mod source;

@@ -35,6 +35,14 @@ pub(crate) fn count(n: u64) -> String {
     indicatif::HumanCount(n).to_string()
 }
 
+/// A hidden folder beside a file, which goes when it is dropped.
+pub(crate) fn folder_beside(path: &Path) -> Result<tempfile::TempDir> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let made =
+        tempfile::Builder::new().prefix(".fpack-").tempdir_in(folder.unwrap_or(Path::new(".")));
+    made.with_context(|| format!("{}: cannot create a folder beside it", path.display()))
+}
+
 /// Writes a file whole or not at all.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     let name = || path.display().to_string();

@@ -5,6 +5,7 @@ use crate::output;
 use crate::source::{LoadedSource, PointsOptions, SourceArgs};
 use anyhow::Result;
 use forest_pack::header::{self, Meta};
+use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackWriter, SectionId, kind};
 use forest_points::{BakeOptions, BakeReport, Order, RadiusRule, bake};
 use serde::Serialize;
@@ -64,7 +65,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let source = args.source.load(quiet)?;
     let kept = existing(args, &source.meta)?;
     let options = args.bake_options(source.trees)?;
-    let mut writer = PackWriter::create(&args.output)?;
+    // A pack that is to be measured takes its name only once it is.
+    let unmeasured = if args.measure { Some(output::folder_beside(&args.output)?) } else { None };
+    let baked = match &unmeasured {
+        Some(folder) => folder.path().join("unmeasured.fpack"),
+        None => args.output.clone(),
+    };
+    let mut writer = PackWriter::create(&baked)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
     let bar = output::bar(source.soup.triangles.len() as u64, "points", quiet);
     let report = bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
@@ -73,10 +80,15 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         for (id, _) in pack.sections().filter(|(id, _)| is_foreign(id.kind, &options)) {
             writer.copy(pack, id)?;
         }
+        // What was measured of the old points says nothing about the new ones.
+        let others = Measures::read(pack)?.map(|m| m.without(kind::POINTS_HEADER));
+        if let Some(others) = others.filter(|m| !m.rows.is_empty()) {
+            others.write(&mut writer)?;
+        }
     }
     writer.finish()?;
     if args.measure {
-        crate::eval::measure(&args.output, &source.soup, quiet)?;
+        crate::eval::measure(&baked, &args.output, &source.soup, quiet)?;
     }
     let summary = Summary::new(&args.output, &source, &report, start.elapsed().as_secs_f64())?;
     if !quiet {

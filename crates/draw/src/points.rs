@@ -76,7 +76,8 @@ impl<'a> PointsFrame<'a> {
             thresholds.largest.0 = f64::INFINITY;
         }
         let cut = select(block, camera, &thresholds);
-        let mut list = DisplayList::of_ellipses(point_ellipses(block, &cut, camera, style));
+        let all = &|_| true;
+        let mut list = DisplayList::of_ellipses(point_ellipses(block, &cut, camera, style, all));
         if let Some(surfaces) = surfaces {
             triangles(block, &cut, camera, surfaces, &mut list);
         }
@@ -109,16 +110,19 @@ impl<'a> PointsFrame<'a> {
     }
 }
 
-/// The points of a cut as `camera` sees them, lit as `style` says, without those behind the eye.
+/// The points of a cut whose index `keep` wants, as `camera` sees them, lit as `style` says, without
+/// those behind the eye.
 pub fn point_ellipses(
     block: &PointsBlock,
     cut: &Cut,
     camera: &Camera,
     style: &Style,
+    keep: &(dyn Fn(u32) -> bool + Sync),
 ) -> Vec<Ellipse> {
     let projector = Projector::new(camera, near(block));
     let ellipses = |c: &CellCut| -> Vec<Ellipse> {
         c.drawn_points(block)
+            .filter(|(id, _, _)| keep(*id))
             .filter_map(|(id, cell, p)| ellipse(block, &projector, camera, style, id, cell, p))
             .collect()
     };

@@ -1,4 +1,6 @@
-"""Metrics of made pictures by other people's code: writes metrics.json beside itself.
+"""Metrics of made pictures, computed without this project's code: writes metrics.json beside itself.
+
+SSIM and PSNR are scikit-image's, FLIP is its authors'; the others are written out in numpy.
 
     pip install scikit-image==0.26.0 flip-evaluator==1.7 numpy
     python3 crates/eval/reference/metrics.py
@@ -65,6 +67,10 @@ def compare(case, width, height):
         *pictures, "LDR", inputsRGB=True, applyMagma=False, computeMeanError=True,
         parameters={"ppd": 67.0},
     )
+    four = [picture(case, k, width, height)[0].astype(np.float64) for k in range(4)]
+    ys, xs = np.nonzero(np.any([p[..., 3] > 0 for p in four], axis=0))
+    whole = np.s_[ys.min() : ys.max() + 1, xs.min() : xs.max() + 1]
+    residual = (four[3] - four[2]) - (four[1] - four[0])
     low, high = np.minimum(a64[..., 3], b64[..., 3]), np.maximum(a64[..., 3], b64[..., 3])
     both = low > 0
     depth = np.sqrt(np.average((da[both] - db[both]) ** 2, weights=low[both]))
@@ -80,6 +86,7 @@ def compare(case, width, height):
         "coverage_ratio": float(np.sum(b64[..., 3]) / np.sum(a64[..., 3]) - 1.0),
         "silhouette_iou": float(np.sum(low) / np.sum(high)),
         "depth": float(depth),
+        "popping": float(np.sqrt(np.mean(residual[whole] ** 2))),
     }
 
 

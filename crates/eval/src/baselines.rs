@@ -6,29 +6,30 @@ use forest_pack::{Pack, PackWriter};
 use forest_points::{BakeOptions, GridChoice, Order, PointsBlock, RadiusRule, SurfelSize, bake};
 use forest_raster::Surfaces;
 use forest_soup::TriangleSoup;
+use std::borrow::Cow;
 
 /// Packs and meshes that contenders draw.
-pub struct Baselines {
+pub struct Baselines<'s> {
     area: Pack,
     paper: Pack,
     clustering: Pack,
-    levels: Vec<(f64, TriangleSoup)>,
-    full: Vec<(f64, TriangleSoup)>,
+    levels: Vec<(f64, Cow<'s, TriangleSoup>)>,
+    full: Vec<(f64, Cow<'s, TriangleSoup>)>,
     surfaces: Surfaces,
 }
 
 /// Shares of triangles that the mesh simplifier is asked for.
 const MESH_SHARES: [f64; 6] = [0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
 
-/// Ratio of k and s_m where the depth bias is on.
-pub(crate) const BIAS: f64 = 1.0;
+/// k over s_m of the paper's rules: the most that leaves no negative threshold at the front.
+const PAPER_BIAS: f64 = 1.0;
 
-impl Baselines {
+impl<'s> Baselines<'s> {
     /// Bakes and simplifies `soup` with the surfels of `block`.
     ///
     /// # Errors
     /// When a bake fails or the temporary folder cannot be written.
-    pub fn new(soup: &TriangleSoup, block: &PointsBlock) -> Result<Self, EvalError> {
+    pub fn new(soup: &'s TriangleSoup, block: &PointsBlock) -> Result<Self, EvalError> {
         let h = &block.header;
         let same = BakeOptions {
             grid: GridChoice::Fixed(h.grid),
@@ -48,8 +49,8 @@ impl Baselines {
             area: baked(soup, &area)?,
             paper: baked(soup, &paper)?,
             clustering: baked(soup, &BakeOptions { grid: whole, ..area })?,
-            levels: MESH_SHARES.map(|share| (share, simplified(soup, share))).into(),
-            full: vec![(1.0, soup.clone())],
+            levels: MESH_SHARES.map(|share| (share, Cow::Owned(simplified(soup, share)))).into(),
+            full: vec![(1.0, Cow::Borrowed(soup))],
             surfaces: Surfaces::new(&soup.materials, &soup.textures),
         })
     }
@@ -107,7 +108,7 @@ impl Baselines {
                 "paper",
                 "radius and order of Gilet, Meyer, Neyret 2005, depth bias k = s_m",
                 paper,
-                BIAS,
+                PAPER_BIAS,
                 Look::Translucent,
             ),
             points(
@@ -139,7 +140,7 @@ impl Baselines {
     }
 }
 
-/// The pack with and without depth bias.
+/// The pack without and with depth bias.
 pub fn own_contenders<'a>(
     block: &'a PointsBlock<'a>,
     surfaces: Option<&'a Surfaces>,
@@ -151,7 +152,12 @@ pub fn own_contenders<'a>(
     };
     vec![
         points("pack", "the pack as it is drawn by default, k = 0", 0.0),
-        points("biased", "the pack with depth bias k = s_m: coarser behind, finer in front", BIAS),
+        points(
+            "bias-1/4",
+            "the pack with depth bias k = s_m/4: coarser behind, finer in front",
+            0.25,
+        ),
+        points("bias-1", "the pack with depth bias k = s_m", 1.0),
     ]
 }
 
@@ -186,5 +192,37 @@ fn simplified(soup: &TriangleSoup, share: f64) -> TriangleSoup {
         materials.extend(std::iter::repeat_n(m, kept.len() / 3));
         triangles.extend(kept.as_chunks::<3>().0);
     }
-    TriangleSoup { triangles, triangle_materials: materials, ..soup.clone() }
+    with_triangles(soup, triangles, materials)
+}
+
+/// A soup of some of another's triangles, with the vertices that they use.
+fn with_triangles(
+    soup: &TriangleSoup,
+    mut triangles: Vec<[u32; 3]>,
+    triangle_materials: Vec<u16>,
+) -> TriangleSoup {
+    let mut places = vec![u32::MAX; soup.positions.len()];
+    let mut used: Vec<usize> = Vec::new();
+    for v in triangles.as_flattened_mut() {
+        let place = &mut places[*v as usize];
+        if *place == u32::MAX {
+            *place = used.len() as u32;
+            used.push(*v as usize);
+        }
+        *v = *place;
+    }
+    fn pick<T: Copy>(from: &[T], used: &[usize]) -> Vec<T> {
+        if from.is_empty() { vec![] } else { used.iter().map(|&v| from[v]).collect() }
+    }
+    TriangleSoup {
+        origin: soup.origin,
+        positions: pick(&soup.positions, &used),
+        normals: pick(&soup.normals, &used),
+        uvs: pick(&soup.uvs, &used),
+        colors: pick(&soup.colors, &used),
+        triangles,
+        triangle_materials,
+        materials: soup.materials.clone(),
+        textures: soup.textures.clone(),
+    }
 }

@@ -6,7 +6,7 @@
 
 use crate::error::EvalError;
 use crate::frame::{View, views_from};
-use crate::sweep::Truth;
+use crate::truth::Truth;
 use forest_draw::draw_points;
 use forest_points::{Calibration, PixelArea, PointsBlock, SizeCode, Thresholds};
 use forest_raster::{Light, Sampling, Style};
@@ -18,7 +18,7 @@ const VIEWS: u32 = 6;
 /// Rounds of measuring and correcting.
 const ROUNDS: u32 = 4;
 /// Coverage within this is not corrected any more.
-const GOOD: f64 = 0.002;
+const GOOD: f64 = 0.004;
 /// Thresholds in square pixels: this one and every fourfold of it.
 const FIRST: f64 = 1.0;
 const CUTS: usize = 9;
@@ -53,59 +53,78 @@ pub fn calibrate(
     for view in &views {
         covered.push(truth.picture(view, HEIGHT, side).mean_coverage());
     }
-    if covered.contains(&0.0) {
-        return Err(EvalError::NothingToSee);
+    if let Some(i) = covered.iter().position(|c| *c == 0.0) {
+        return Err(EvalError::Unseen { elevation: views[i].elevation });
     }
     let mut block = block.clone();
     let codes = cut_codes(truth, &block);
-    let mut cuts = [Cut { log: 0.0, slope: 0.5, error: f64::INFINITY }; CUTS];
-    let (mut before, mut done) = (Vec::new(), 0.0);
+    let mut cuts = [Cut::default(); CUTS];
+    let mut before = Vec::new();
+    let mut best: Option<(f64, Calibration)> = None;
     for round in 0..ROUNDS {
-        block.calibration = Some(spread(&codes, &cuts));
-        for (i, cut) in cuts.iter_mut().enumerate().filter(|c| c.1.error.abs() > GOOD) {
-            let error = coverage_error(truth, &block, &views, &covered, i, side);
-            cut.learn(error, round);
-            done += 1.0 / (CUTS as f64 * f64::from(ROUNDS));
-            progress(done);
+        let calibration = spread(&codes, &cuts);
+        block.calibration = Some(calibration.clone());
+        for (i, cut) in cuts.iter_mut().enumerate() {
+            cut.learn(coverage_error(truth, &block, &views, &covered, i, side), round);
+            progress((f64::from(round) + i as f64 / CUTS as f64) / f64::from(ROUNDS));
         }
         if round == 0 {
             before = cuts.iter().map(|c| c.error).collect();
         }
-        if cuts.iter().all(|c| c.error.abs() <= GOOD) {
+        // The best of what was measured is taken, not the last correction.
+        let worst = cuts.iter().fold(0.0, |w: f64, c| w.max(c.error.abs()));
+        if best.as_ref().is_none_or(|b| worst < b.0) {
+            best = Some((worst, calibration));
+        }
+        if worst <= GOOD {
             break;
         }
-        cuts.iter_mut().filter(|c| c.error.abs() > GOOD).for_each(Cut::correct);
+        cuts.iter_mut().for_each(Cut::correct);
     }
     progress(1.0);
-    Ok(Calibrated { calibration: spread(&codes, &cuts), before })
+    let (_, calibration) = best.expect("at least one round");
+    Ok(Calibrated { calibration, before })
 }
 
 /// What is known of one threshold's cut.
 #[derive(Clone, Copy)]
 struct Cut {
-    /// Natural logarithm of the factor on areas.
+    /// Natural logarithm of the factor on areas, and by how much it was corrected last.
     log: f64,
+    step: f64,
     /// Growth of the logarithm of coverage with it.
     slope: f64,
     /// Coverage over the source's, minus one, when last measured.
     error: f64,
 }
 
+impl Default for Cut {
+    fn default() -> Self {
+        Self { log: 0.0, step: 0.0, slope: 0.5, error: 0.0 }
+    }
+}
+
 impl Cut {
-    /// Takes a measured error, and learns how far the last correction went.
+    /// Takes a measured error, and learns from what the last correction did.
     fn learn(&mut self, error: f64, round: u32) {
-        if round > 0 {
-            let step = -(1.0 + self.error).ln() / self.slope;
-            let change = (1.0 + error).ln() - (1.0 + self.error).ln();
-            self.slope = (change / step).clamp(0.15, 1.2);
+        if round > 0 && self.step.abs() > 1e-3 {
+            let change = log_coverage(error) - log_coverage(self.error);
+            self.slope = (change / self.step).clamp(0.15, 1.2);
         }
         self.error = error;
     }
 
     fn correct(&mut self) {
-        let log = self.log - (1.0 + self.error).ln() / self.slope;
-        self.log = log.clamp(LEAST.ln(), MOST.ln());
+        let log = self.log - log_coverage(self.error) / self.slope;
+        let log = log.clamp(LEAST.ln(), MOST.ln());
+        self.step = log - self.log;
+        self.log = log;
     }
+}
+
+/// Logarithm of coverage over the source's; a cut may cover nothing.
+fn log_coverage(error: f64) -> f64 {
+    (1.0 + error).max(1e-3).ln()
 }
 
 /// Size codes of the thresholds, fractional.
@@ -171,9 +190,28 @@ mod tests {
     use super::*;
 
     #[test]
+    fn corrections_converge_on_any_slope() {
+        for slope in [0.2, 0.5, 1.0] {
+            // Coverage 1.3 times the source's, growing with areas to the power of `slope`.
+            let mut cut = Cut::default();
+            for round in 0..ROUNDS {
+                cut.learn(1.3 * (slope * cut.log).exp() - 1.0, round);
+                cut.correct();
+            }
+            let error = 1.3 * (slope * cut.log).exp() - 1.0;
+            assert!(error.abs() < GOOD || cut.log == LEAST.ln(), "{slope}: {error}");
+        }
+        // What covers nothing grows as far as it may, and stays a number.
+        let mut cut = Cut::default();
+        cut.learn(-1.0, 0);
+        cut.correct();
+        assert_eq!(cut.log, MOST.ln());
+    }
+
+    #[test]
     fn factors_pass_through_those_of_the_cuts() {
         let codes = [800.0, 960.0, 1120.0];
-        let cut = |log: f64| Cut { log, slope: 0.5, error: 0.0 };
+        let cut = |log: f64| Cut { log, ..Cut::default() };
         let c = spread(&codes, &[cut(0.0), cut(2f64.ln()), cut(0.5f64.ln())]);
         let at = |node: usize| f64::from(c.factors()[node]);
         assert!((at(0) - 1.0).abs() < 1e-6 && (at(10) - 1.0).abs() < 1e-6);

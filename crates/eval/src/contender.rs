@@ -6,6 +6,7 @@ use forest_raster::{DisplayList, Ellipse, Picture, Style, Surfaces, draw, raster
 use forest_soup::{Camera, TriangleSoup};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::time::Instant;
 
 /// s_M over s_m: points larger than that are drawn as triangles.
@@ -32,7 +33,7 @@ pub(crate) enum Way<'a> {
     /// A random part of the finest points, enlarged to keep their area.
     RandomPoints { block: &'a PointsBlock<'a> },
     /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
-    Meshes { levels: &'a [(f64, TriangleSoup)], surfaces: &'a Surfaces },
+    Meshes { levels: &'a [(f64, Cow<'a, TriangleSoup>)], surfaces: &'a Surfaces },
 }
 
 /// How points are drawn.
@@ -96,8 +97,9 @@ pub struct Cost {
     pub bytes: f64,
     /// Time of `select` in nanoseconds (the median of five); null where nothing is selected.
     pub select_ns: Option<f64>,
-    /// Time of the picture in milliseconds, by the renderer that the report names.
-    pub render_ms: f64,
+    /// Time of the picture in milliseconds, by the renderer that the report names; in the first view
+    /// only, null in the others.
+    pub render_ms: Option<f64>,
 }
 
 /// Bytes of a triangle in an indexed mesh: three 32-bit indices and, at half a vertex a triangle,
@@ -119,8 +121,7 @@ impl Contender<'_> {
 
     /// Draws with `knob`, one of [`Contender::knobs`].
     pub(crate) fn draw(&self, camera: &Camera, knob: Knob, style: &Style) -> (Picture, Cost) {
-        let start = Instant::now();
-        let (picture, mut cost) = match (&self.way, knob) {
+        match (&self.way, knob) {
             (Way::Points { block, surfaces, look, .. }, knob) => {
                 let thresholds = knob.thresholds().expect("points have thresholds");
                 draw_points(block, *surfaces, camera, thresholds, *look, style)
@@ -135,17 +136,12 @@ impl Contender<'_> {
                     primitives,
                     bytes: primitives * MESH_TRIANGLE_BYTES,
                     select_ns: None,
-                    render_ms: 0.0,
+                    render_ms: None,
                 };
                 (rasterize(soup, surfaces, camera, style), cost)
             }
             (_, Knob::Points { .. }) => unreachable!("only points have thresholds"),
-        };
-        cost.render_ms = start.elapsed().as_secs_f64() * 1e3;
-        if let (Way::Points { block, .. }, Some(t)) = (&self.way, knob.thresholds()) {
-            cost.select_ns = Some(select_ns(block, camera, &t));
         }
-        (picture, cost)
     }
 }
 
@@ -178,7 +174,8 @@ fn draw_points(
     }
     let (drawn, bytes) = (frame.drawn(), frame.bytes() as f64);
     let primitives = drawn.primitives() as f64;
-    (frame.draw(), Cost { primitives, bytes, select_ns: None, render_ms: 0.0 })
+    let select_ns = Some(select_ns(block, camera, &thresholds));
+    (frame.draw(), Cost { primitives, bytes, select_ns, render_ms: None })
 }
 
 /// The same projected area without translucency.
@@ -196,14 +193,13 @@ fn draw_random(block: &PointsBlock, camera: &Camera, share: f64, style: &Style) 
         depth_bias: PixelArea(0.0),
     };
     let cut = forest_points::select(block, camera, &all);
-    let mut ellipses = point_ellipses(block, &cut, camera, style);
     // A stable order of chance: every smaller share is a part of every larger one.
-    ellipses.retain(|e| chance(e.id) < share);
+    let mut ellipses = point_ellipses(block, &cut, camera, style, &|id| chance(id) < share);
     ellipses.iter_mut().for_each(|e| e.radius /= share.sqrt());
     let primitives = ellipses.len() as f64;
     let bytes = primitives * size_of::<forest_points::PointRecord>() as f64;
     let picture = draw(&DisplayList::of_ellipses(ellipses), camera, style);
-    (picture, Cost { primitives, bytes, select_ns: None, render_ms: 0.0 })
+    (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
 }
 
 /// A number in `0..1` for each id, far from that of the hash rule of opacity.

@@ -2,7 +2,8 @@
 
 use crate::evaluation::Summary;
 use crate::frame::Band;
-use crate::sweep::{Plan, Row, Sweep};
+use crate::plan::Plan;
+use crate::sweep::{Row, Sweep};
 use forest_pack::kind;
 use forest_pack::measures::{Light, Measure, Measures};
 
@@ -12,7 +13,7 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
     for band in [Band::Level, Band::Oblique, Band::High] {
         let mut groups: Vec<Vec<&Row>> = Vec::new();
         for row in &sweep.rows {
-            let own = row.contender == "pack" || row.contender == "biased";
+            let own = ["pack", "bias-1/4", "bias-1"].contains(&row.contender.as_str());
             if !own || sweep.views[row.view as usize].band != band {
                 continue;
             }

@@ -20,8 +20,16 @@ pub enum EvalError {
     /// The source shows nothing.
     #[error("the source has no triangle with an extent: there is nothing to compare with")]
     NothingToSee,
+    /// The source covers nothing in some view: it is transparent, or far smaller than its box.
+    #[error(
+        "the source covers nothing from {elevation:.0}° above the horizon: no coverage to keep"
+    )]
+    Unseen {
+        /// Of the view, in degrees.
+        elevation: f64,
+    },
     /// The temporary folder is not there or full.
-    #[error("cannot use the temporary folder: {0}")]
+    #[error("cannot use the temporary folder")]
     Temporary(#[source] std::io::Error),
     /// A plan that makes no sense.
     #[error("{option} is {value}; it must be {rule}")]

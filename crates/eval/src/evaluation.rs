@@ -3,8 +3,10 @@
 use crate::contender::Contender;
 use crate::frame::View;
 use crate::metrics::Errors;
+use crate::path::PoppingRow;
+use crate::plan::{BACKGROUND, Plan};
 use crate::ratio::{Metric, Ratio, ratios};
-use crate::sweep::{BACKGROUND, Plan, PoppingRow, Row, Sweep};
+use crate::sweep::{Row, Sweep};
 use forest_raster::Light;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,7 +27,7 @@ pub struct Evaluation {
     pub contenders: Vec<ContenderInfo>,
     /// One picture each.
     pub rows: Vec<Row>,
-    /// Primitives at equal error, compared with the pack.
+    /// Primitives at equal error, compared with the pack, and with the pack without calibration.
     pub ratios: Vec<Ratio>,
     /// Changes of pictures across switches of level.
     pub popping: Vec<PoppingRow>,
@@ -109,7 +111,7 @@ impl Evaluation {
             subject,
             views: sweep.views,
             contenders: contenders.iter().map(info).collect(),
-            ratios: ratios(&sweep.rows, "pack"),
+            ratios: ["pack", "raw"].iter().flat_map(|base| ratios(&sweep.rows, base)).collect(),
             rows: sweep.rows,
             popping: sweep.popping,
         }
@@ -133,9 +135,12 @@ impl Evaluation {
         groups.into_iter().map(|g| Summary::new(&g)).collect()
     }
 
-    /// The ratio of primitives of `other` and the pack at `height`, if they share an error.
-    pub fn ratio(&self, other: &str, metric: Metric, height: u32) -> Option<&Ratio> {
-        self.ratios.iter().find(|r| r.other == other && r.metric == metric && r.height == height)
+    /// The ratio of primitives of `other` and `base` at `height`, if they share errors.
+    pub fn ratio(&self, base: &str, other: &str, metric: Metric, height: u32) -> Option<&Ratio> {
+        self.ratios
+            .iter()
+            .filter(|r| r.base == base && r.other == other)
+            .find(|r| r.metric == metric && r.height == height)
     }
 }
 

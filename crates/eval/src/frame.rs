@@ -17,6 +17,9 @@ pub struct View {
     pub band: Band,
 }
 
+/// Elevation of the lowest view, in degrees: views start at sin(elevation) = −0.1.
+const LOWEST: f32 = -6.0;
+
 /// A range of elevations, for tables.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
@@ -35,7 +38,7 @@ impl Band {
     /// Its lowest and highest elevation in degrees.
     pub fn range(self) -> [f32; 2] {
         match self {
-            Self::Level => [-90.0, 20.0],
+            Self::Level => [LOWEST, 20.0],
             Self::Oblique => [20.0, 50.0],
             Self::High => [50.0, 90.0],
         }
@@ -89,15 +92,14 @@ pub struct Frame {
 impl Frame {
     /// The frame of what is finite of a soup; `None` if nothing of it has an extent.
     pub fn of(soup: &TriangleSoup) -> Option<Self> {
-        let used = soup.triangles.iter().flatten().map(|&v| soup.positions[v as usize]);
-        let (min, max) = used
-            .filter(|p| p.is_finite())
-            .map(|p| p.as_dvec3())
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
-        let size = max - min;
+        let bounds = soup.bounds();
+        if bounds.is_empty() {
+            return None;
+        }
+        let size = bounds.size();
         (size.max_element() > 0.0).then(|| Self {
-            center: soup.origin + (min + max) * 0.5,
-            radius: size.length() * 0.5,
+            center: soup.origin + bounds.center(),
+            radius: bounds.half_diagonal(),
             height: size.max_element(),
         })
     }

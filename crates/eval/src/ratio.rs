@@ -52,7 +52,10 @@ pub struct Ratio {
 /// Errors at which two curves are compared.
 const PROBES: usize = 16;
 
-/// Ratios of `base` and every other contender; those that share no error are left out.
+/// Errors that two curves must share, as a factor: a ratio over less says little.
+const OVERLAP: f64 = 1.5;
+
+/// Ratios of `base` and every other contender, where they share errors over a factor of 1.5 or more.
 pub fn ratios(rows: &[Row], base: &str) -> Vec<Ratio> {
     let mut names: Vec<&str> = Vec::new();
     let mut heights: Vec<u32> = Vec::new();
@@ -140,7 +143,7 @@ impl Curve {
         let ends = |c: &Self| [c.0[0][0], c.0[c.0.len() - 1][0]];
         let ([a0, a1], [b0, b1]) = (ends(self), ends(other));
         let (from, to) = (a0.max(b0), a1.min(b1));
-        if from >= to {
+        if to - from < OVERLAP.ln() {
             return None;
         }
         let sum: f64 = (0..PROBES)
@@ -158,7 +161,7 @@ mod tests {
 
     /// A curve n = c/error over `errors`.
     fn rows(name: &str, c: f64, errors: &[f64], view: u32) -> Vec<Row> {
-        let cost = |n| Cost { primitives: n, bytes: 0.0, select_ns: None, render_ms: 0.0 };
+        let cost = |n| Cost { primitives: n, bytes: 0.0, select_ns: None, render_ms: None };
         let errors_of = |flip| Errors {
             rmse: flip * 2.0,
             psnr: None,
@@ -200,6 +203,9 @@ mod tests {
     fn curves_without_common_errors_have_no_ratio() {
         let mut all = rows("a", 10.0, &[0.01, 0.02], 0);
         all.extend(rows("b", 10.0, &[0.1, 0.2], 0));
+        assert_eq!(ratios(&all, "a"), vec![]);
+        // Nor have those that share only a little.
+        all.extend(rows("c", 10.0, &[0.015, 0.2], 0));
         assert_eq!(ratios(&all, "a"), vec![]);
     }
 }

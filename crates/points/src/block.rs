@@ -4,7 +4,7 @@ use crate::calibration::Calibration;
 use crate::header::{CellRecord, PointsHeader};
 use crate::record::PointRecord;
 use crate::triangle::TriangleRecord;
-use forest_pack::measures::{ErrorKind, Need};
+use forest_pack::measures::{ErrorKind, Light, Need};
 use forest_pack::{Pack, PackError, SectionId, header, kind};
 use forest_soup::Camera;
 use glam::DVec3;
@@ -75,7 +75,7 @@ impl<'a> PointsBlock<'a> {
     }
 
     /// What a pack's measured table is to be asked for this block before `camera`: its height in
-    /// pixels and the camera's elevation, both at the block's middle.
+    /// pixels and the camera's elevation, both at the block's middle, under base colours.
     pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
         let [min, max] = [self.header.min, self.header.max].map(DVec3::from_array);
         let middle = self.to_world((min + max) * 0.5);
@@ -85,6 +85,7 @@ impl<'a> PointsBlock<'a> {
             representation: kind::POINTS_HEADER,
             pixel_height: height as f32,
             elevation: Some(camera.to_eye(middle).y.clamp(-1.0, 1.0).asin().to_degrees() as f32),
+            light: Light::Albedo,
             error,
         }
     }

@@ -23,9 +23,10 @@ impl Calibration {
     /// What a factor may be.
     pub const RANGE: std::ops::RangeInclusive<f32> = 0.25..=4.0;
 
-    /// The factors of all octaves; each is brought into [`Calibration::RANGE`].
+    /// The factors of all octaves; each is brought into [`Calibration::RANGE`], and NaN to 1.
     pub fn new(factors: [f32; Self::NODES]) -> Self {
-        let factors = factors.map(|f| f.clamp(*Self::RANGE.start(), *Self::RANGE.end()));
+        let (low, high) = (*Self::RANGE.start(), *Self::RANGE.end());
+        let factors = factors.map(|f| if f.is_nan() { 1.0 } else { f.clamp(low, high) });
         let radii = (0..=SizeCode::INFINITE.bits())
             .map(|code| {
                 let at = f64::from(code) / SizeCode::PER_OCTAVE;
@@ -78,6 +79,30 @@ impl Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A pack with `factors` in the section.
+    fn pack(factors: &[f32]) -> Pack {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.fpack");
+        let mut writer = PackWriter::create(&path).unwrap();
+        writer.add(ID, Codec::None, bytemuck::cast_slice(factors)).unwrap();
+        writer.finish().unwrap();
+        Pack::open(&path).unwrap()
+    }
+
+    #[test]
+    fn only_sound_factors_are_read() {
+        let good = [1.5f32; Calibration::NODES];
+        assert_eq!(Calibration::read(&pack(&good)).unwrap(), Some(Calibration::new(good)));
+        let error = |factors: &[f32]| Calibration::read(&pack(factors)).unwrap_err().to_string();
+        assert!(error(&good[1..]).ends_with("points.calibration[0]: 52 factors, not 53"));
+        for bad in [f32::NAN, 0.2, 4.5, f32::INFINITY] {
+            let mut factors = good;
+            factors[7] = bad;
+            assert!(error(&factors).contains("factor 7 is "), "{bad}");
+        }
+        assert_eq!(Calibration::new([f32::NAN; Calibration::NODES]).factors[3], 1.0);
+    }
 
     #[test]
     fn factors_are_linear_between_octaves_and_stay_in_range() {

@@ -36,7 +36,7 @@ pub enum SurfelSize {
     Auto,
     /// One surfel for each triangle, however large.
     Triangle,
-    /// World units.
+    /// World units; no smaller than 2⁻¹⁶ of the block's radius.
     Units(f64),
 }
 

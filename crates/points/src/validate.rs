@@ -14,6 +14,12 @@ type Broken = (u16, String);
 /// Exponents of real blocks: from far below an atom to far above a galaxy, in metres.
 const EXPONENTS: std::ops::RangeInclusive<i32> = -200..=200;
 
+/// Cells of the largest grid.
+pub(crate) const MOST_CELLS: u64 = 1 << 20;
+
+/// The smallest surfel size, in block units: the step of a position in a block of one cell.
+pub(crate) const SMALLEST_SURFEL: f64 = 1.0 / 65_536.0;
+
 /// Checks every invariant of a points representation that selection and renderers rely on.
 ///
 /// # Errors
@@ -42,7 +48,15 @@ fn header(block: &PointsBlock) -> Result<(), Broken> {
         h.min.iter().chain(&h.max).all(inside) && h.min.iter().zip(&h.max).all(|(a, b)| a <= b),
         format!("box {:?}..{:?} is not in the unit cube", h.min, h.max),
     )?;
-    rule(h.surfel_size > 0.0, format!("surfel size {}", h.surfel_size))?;
+    let s = h.surfel_size;
+    rule(s >= SMALLEST_SURFEL, format!("surfel size {s} block units, below {SMALLEST_SURFEL}"))?;
+    let t = h.alpha_tolerance;
+    rule((0.0..=1.0).contains(&t), format!("alpha tolerance {t} not in 0..=1"))?;
+    let cells = h.grid.iter().try_fold(1u64, |cells, &n| cells.checked_mul(u64::from(n)));
+    rule(
+        cells.is_some_and(|n| (1..=MOST_CELLS).contains(&n)),
+        format!("a grid of {:?} cells; at least 1 and at most {MOST_CELLS}", h.grid),
+    )?;
     let finite = |v: &[f32; 2]| v.iter().all(|x| x.is_finite());
     rule(
         h.uv_ranges.iter().all(|r| finite(&r.min) && finite(&r.step)),

@@ -111,7 +111,10 @@ impl<'a> Projector<'a> {
                 n += 1;
             }
             if a_seen != b_seen {
-                out[n] = a.lerp(b, (self.near - da) / (db - da));
+                // From the seen to the unseen end, whichever way the edge is walked: both of its
+                // triangles get the same corner.
+                let (seen, hidden, ds, dh) = if a_seen { (a, b, da, db) } else { (b, a, db, da) };
+                out[n] = seen.lerp(hidden, (self.near - ds) / (dh - ds));
                 n += 1;
             }
         }
@@ -131,8 +134,8 @@ impl Corner {
     }
 }
 
-/// What a canvas draws. The order does not matter but for equal depths, where the earlier wins and
-/// triangles go first.
+/// What a canvas draws. The order does not matter but for things of one and the same depth, where
+/// the earlier wins and triangles go first.
 #[derive(Clone, Debug, Default)]
 pub struct DisplayList<'a> {
     pub(crate) triangles: Vec<Triangle<'a>>,

@@ -62,11 +62,8 @@ pub(crate) fn corners(soup: &TriangleSoup, i: usize) -> [Corner; 3] {
     })
 }
 
-/// Size of what is finite of a soup: the larger of its box's sides.
+/// The longest side of the box around a soup; 0 for nothing.
 pub(crate) fn extent(soup: &TriangleSoup) -> f64 {
-    let finite = soup.positions.par_iter().filter(|p| p.is_finite());
-    let (min, max) = finite
-        .map(|&p| (p, p))
-        .reduce(|| (Vec3::INFINITY, Vec3::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-    f64::from((max - min).max_element().max(0.0))
+    let bounds = soup.bounds();
+    if bounds.is_empty() { 0.0 } else { bounds.size().max_element() }
 }

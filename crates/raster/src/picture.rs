@@ -32,9 +32,10 @@ impl Picture {
         }
     }
 
-    /// Mean of the coverage over all pixels, in `0..=1`.
+    /// Mean of the coverage over all pixels, in `0..=1`; 0 without pixels.
     pub fn mean_coverage(&self) -> f64 {
-        self.pixels.iter().map(|p| f64::from(p[3])).sum::<f64>() / self.pixels.len() as f64
+        let sum: f64 = self.pixels.iter().map(|p| f64::from(p[3])).sum();
+        sum / self.pixels.len().max(1) as f64
     }
 
     /// Every `factor × factor` pixels become their mean. Columns and rows that do not fill a pixel
@@ -80,9 +81,9 @@ impl Picture {
 /// A pixel as it is summed up.
 #[derive(Default)]
 pub(crate) struct PixelMean {
-    pixel: [f32; 4],
+    pixel: [f64; 4],
     depth: f64,
-    normal: [f32; 3],
+    normal: [f64; 3],
 }
 
 impl PixelMean {
@@ -91,20 +92,20 @@ impl PixelMean {
     pub(crate) fn add(&mut self, pixel: [f32; 4], depth: f32, normal: [f32; 3], share: f32) {
         if pixel[3] > 0.0 {
             for (sum, v) in self.pixel.iter_mut().zip(pixel) {
-                *sum += v * share;
+                *sum += f64::from(v * share);
             }
             self.depth += f64::from(depth) * f64::from(pixel[3] * share);
             for (sum, v) in self.normal.iter_mut().zip(normal) {
-                *sum += v * share;
+                *sum += f64::from(v * share);
             }
         }
     }
 
     pub(crate) fn store(self, out: &mut Picture, i: usize) {
         if self.pixel[3] > 0.0 {
-            out.pixels[i] = self.pixel;
-            out.depth[i] = (self.depth / f64::from(self.pixel[3])) as f32;
-            out.normal[i] = self.normal;
+            out.pixels[i] = self.pixel.map(|v| v as f32);
+            out.depth[i] = (self.depth / self.pixel[3]) as f32;
+            out.normal[i] = self.normal.map(|v| v as f32);
         }
     }
 }

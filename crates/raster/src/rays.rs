@@ -37,10 +37,10 @@ pub struct RayScene<'a> {
 }
 
 /// Width of the soup in the units of the hierarchy, within a factor of two.
-const EXTENT: f32 = 1024.0;
+const EXTENT: f64 = 1024.0;
 
 /// Distance by which secondary rays start off their surface, in those units.
-const LIFT: f32 = 1e-5 * EXTENT;
+const LIFT: f32 = 1e-5 * EXTENT as f32;
 
 /// Where a ray meets a triangle: distance and barycentric coordinates of corners 1 and 2.
 #[derive(Clone, Copy)]
@@ -57,10 +57,10 @@ impl<'a> RayScene<'a> {
     /// # Panics
     /// If the soup breaks its own rules ([`TriangleSoup::validate`]).
     pub fn new(soup: &'a TriangleSoup, surfaces: &'a Surfaces) -> Self {
-        let scale = match extent(soup) as f32 {
+        let scale = match extent(soup) {
             extent if extent > 0.0 => (EXTENT / extent).log2().floor().clamp(-120.0, 120.0).exp2(),
             _ => 1.0,
-        };
+        } as f32;
         let all: Vec<(u32, Triangle)> = (0..soup.triangles.len())
             .filter(|&i| soup.corners(i).iter().all(|p| p.is_finite()))
             .map(|i| {
@@ -232,7 +232,7 @@ impl<'a> RayScene<'a> {
             self.is_free(from, to_sun, grid)
         };
         let [a, b] = [0, 1].map(|salt| {
-            let hash = mix(mix(grid.0 ^ salt) ^ grid.1.rotate_left(13) ^ 0x51ed_270b);
+            let hash = mix(mix(mix(grid.0) ^ grid.1.rotate_left(13)) ^ (0x51ed_270b + salt));
             (hash >> 8) as f32 / 16_777_216.0
         });
         let up = cosine_weighted(normal, a, b);

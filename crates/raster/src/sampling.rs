@@ -5,7 +5,8 @@ use crate::opacity::mix;
 /// Pixels along a side of the tile whose sample places repeat over the picture.
 const TILE: u32 = 4;
 
-/// How many samples a pixel gets, and which draw of them.
+/// How many samples a pixel gets, and which draw of their places. (Partial opacity follows a hash of
+/// its own, which is the same for all seeds.)
 ///
 /// A pixel is cut into `side × side` strata with one sample in each: at its middle for one sample
 /// a pixel (what a GPU draws), else at a place drawn from `seed`.
@@ -13,7 +14,7 @@ const TILE: u32 = 4;
 pub struct Sampling {
     /// Strata along a side of a pixel, 1 to 16.
     pub side: u32,
-    /// Names the draw. Two seeds give pictures that differ by sampling noise only.
+    /// Names the draw.
     pub seed: u32,
 }
 
@@ -61,7 +62,7 @@ impl Pattern {
         self.count
     }
 
-    /// Places of the samples of pixel (x, y), in `0..1` from its top left corner.
+    /// Places of the samples of pixel (x, y), in `0..=1` from its top left corner.
     #[inline]
     pub(crate) fn pixel(&self, x: u32, y: u32) -> (&[f32], &[f32]) {
         let first = ((y % TILE) * TILE + x % TILE) as usize * self.count;

@@ -2,6 +2,7 @@
 
 use crate::{Material, Texture};
 use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Triangles with materials: an `f64` origin and `f32` positions about it.
@@ -39,6 +40,21 @@ impl TriangleSoup {
     #[inline]
     pub fn corners(&self, i: usize) -> [Vec3; 3] {
         self.triangles[i].map(|v| self.positions[v as usize])
+    }
+
+    /// The box around all triangles whose corners are finite, in the soup's space; empty if there is
+    /// none. Vertices that no triangle uses do not count.
+    pub fn bounds(&self) -> Bounds {
+        (0..self.triangles.len())
+            .into_par_iter()
+            .with_min_len(1 << 14)
+            .map(|i| self.corners(i))
+            .filter(|corners| corners.iter().all(|p| p.is_finite()))
+            .fold(
+                || Bounds::EMPTY,
+                |b, corners| corners.iter().fold(b, |b, p| b.with(p.as_dvec3())),
+            )
+            .reduce(|| Bounds::EMPTY, Bounds::union)
     }
 
     /// Checks lengths, indices and material references. Positions may still be non-finite: bakers
@@ -136,6 +152,17 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_leave_out_what_is_not_drawn() {
+        let soup = TriangleSoup {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(9.0), Vec3::NAN],
+            triangles: vec![[0, 1, 2], [3, 4, 0]],
+            ..TriangleSoup::default()
+        };
+        assert_eq!(soup.bounds(), Bounds { min: DVec3::ZERO, max: DVec3::new(1.0, 1.0, 0.0) });
+        assert!(TriangleSoup::default().bounds().is_empty());
+    }
 
     #[test]
     fn validate_names_the_element_and_the_limit() {

@@ -1,10 +1,14 @@
 //! Section [`crate::kind::MEASURES`]: what each level of each representation costs, and how far it
 //! is from the source. One layout for all representations.
 //!
-//! Times are not stored: the same input gives the same bytes on every machine.
+//! Times are not stored: the same input gives the same bytes whenever, and with any number of threads.
 
 use crate::{Pack, PackError, PackWriter, SectionId, header, kind};
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// No table has more rows.
+pub const MAX_ROWS: usize = 4096;
 
 const ID: SectionId = SectionId::new(kind::MEASURES, 0);
 
@@ -76,6 +80,8 @@ pub struct Need {
     pub pixel_height: f32,
     /// Elevation of the camera above the block's horizon in degrees; `None` for all.
     pub elevation: Option<f32>,
+    /// The light: levels of a pack are usually measured under base colours.
+    pub light: Light,
     /// Which error counts.
     pub error: ErrorKind,
 }
@@ -103,24 +109,33 @@ impl Measures {
         header::write(writer, ID, self)
     }
 
+    /// The rows of other representations and lights than those of `newer`, and all of `newer`.
+    pub fn merged(&self, newer: &Self) -> Self {
+        let key = |r: &Measure| (r.representation, r.light);
+        let kept = self.rows.iter().filter(|r| newer.rows.iter().all(|n| key(n) != key(r)));
+        let rows = kept.chain(&newer.rows).copied().collect();
+        Self { method: newer.method.clone(), rows }
+    }
+
+    /// The rows of other representations than this one.
+    pub fn without(&self, representation: u16) -> Self {
+        let rows = self.rows.iter().filter(|r| r.representation != representation);
+        Self { method: self.method.clone(), rows: rows.copied().collect() }
+    }
+
     /// Checks the rules of SPEC.md, section 4.3.
     ///
     /// # Errors
-    /// The first broken rule, with the row and the value.
+    /// The first broken rule, with the row, the field, the value and the limit.
     pub fn validate(&self) -> Result<(), String> {
+        if self.rows.len() > MAX_ROWS {
+            return Err(format!("{} rows; the limit is {MAX_ROWS}", self.rows.len()));
+        }
+        if self.method.contains(char::is_control) {
+            return Err(format!("method {:?} has control characters", self.method));
+        }
         for (i, r) in self.rows.iter().enumerate() {
-            let size = [r.pixel_height, r.primitives, r.bytes];
-            let errors = [r.rmse, r.rmse_worst, r.flip, r.flip_worst];
-            let level = r.level;
-            let sound = level.iter().all(|v| !v.is_nan())
-                && size.iter().chain(&errors).all(|v| v.is_finite() && *v >= 0.0)
-                && r.ssim.is_finite()
-                && r.coverage.is_finite()
-                && r.pixel_height > 0.0
-                && r.elevation[0] <= r.elevation[1];
-            if !sound {
-                return Err(format!("row {i} has a value out of range: {r:?}"));
-            }
+            r.validate().map_err(|problem| format!("row {i}: {problem}"))?;
         }
         Ok(())
     }
@@ -138,47 +153,72 @@ impl Measures {
     }
 
     /// What is known of each level at the needed height: the worst of the elevations that may be
-    /// met. Between two measured heights both bounds hold, for the level that means the same cut
-    /// in square pixels; beyond them the nearest counts, and nothing is promised.
+    /// met, and of the measured heights next below and above, for the level that means the same cut
+    /// in square pixels. What was not measured in all of them is left out. Beyond the measured
+    /// heights and elevations the nearest count, and the choice says so.
     fn choices(&self, need: &Need) -> Vec<Choice> {
-        let mut rows: Vec<&Measure> = self
-            .rows
-            .iter()
-            .filter(|r| r.representation == need.representation && r.light == Light::Albedo)
-            .filter(|r| {
-                need.elevation.is_none_or(|e| {
-                    let [from, to] = r.elevation;
-                    (from..to).contains(&e.clamp(-89.9, 89.9))
-                })
-            })
-            .collect();
-        rows.sort_by(|a, b| a.pixel_height.total_cmp(&b.pixel_height));
-        let below = rows.iter().rev().find(|r| r.pixel_height <= need.pixel_height);
-        let above = rows.iter().find(|r| r.pixel_height >= need.pixel_height);
-        let heights: Vec<f32> = below.into_iter().chain(above).map(|r| r.pixel_height).collect();
-        let mut choices: Vec<Choice> = Vec::new();
-        for r in rows.iter().filter(|r| heights.contains(&r.pixel_height)) {
+        let asked = |r: &&Measure| r.representation == need.representation && r.light == need.light;
+        let rows: Vec<&Measure> = self.rows.iter().filter(asked).collect();
+        let (low, high) = range(rows.iter().flat_map(|r| r.elevation));
+        let elevation = need.elevation.map(|e| e.clamp(low, high.max(low)));
+        let holds = |r: &Measure| {
+            let [from, to] = r.elevation;
+            elevation.is_none_or(|e| from <= e && (e < to || e == high))
+        };
+        let rows: Vec<&Measure> = rows.into_iter().filter(|r| holds(r)).collect();
+        let (smallest, largest) = range(rows.iter().map(|r| r.pixel_height));
+        let height = need.pixel_height.clamp(smallest, largest.max(smallest));
+        let beyond = elevation != need.elevation || height != need.pixel_height;
+        let below = range(rows.iter().map(|r| r.pixel_height).filter(|h| *h <= height)).1;
+        let above = range(rows.iter().map(|r| r.pixel_height).filter(|h| *h >= height)).0;
+        // By level (as bits: a key), the worst of what was measured and in how many places.
+        let mut places = BTreeSet::new();
+        let mut levels: BTreeMap<[u32; 3], (Choice, usize)> = BTreeMap::new();
+        for r in rows.iter().filter(|r| r.pixel_height == below || r.pixel_height == above) {
             let error = match need.error {
                 ErrorKind::Flip => r.flip_worst,
                 ErrorKind::Rmse => r.rmse_worst,
             };
-            match choices.iter_mut().find(|c| c.level == r.level) {
-                Some(c) => {
-                    c.error = c.error.max(error);
-                    c.primitives = c.primitives.max(r.primitives);
-                    c.heights |= 1 << u32::from(r.pixel_height != heights[0]);
-                }
-                None => {
-                    let heights = 1 << u32::from(r.pixel_height != heights[0]);
-                    let (level, primitives) = (r.level, r.primitives);
-                    choices.push(Choice { level, primitives, error, heights });
-                }
-            }
+            places.insert((r.pixel_height.to_bits(), r.elevation.map(f32::to_bits)));
+            let (level, primitives) = (r.level, r.primitives);
+            let new = (Choice { level, primitives, error, beyond }, 0);
+            let (choice, seen) = levels.entry(level.map(f32::to_bits)).or_insert(new);
+            choice.error = choice.error.max(error);
+            choice.primitives = choice.primitives.max(primitives);
+            *seen += 1;
         }
-        // A level that was measured on one side only promises nothing in between.
-        let all = if heights.first() == heights.last() { 1 } else { 3 };
-        choices.retain(|c| c.heights == all);
-        choices
+        levels.into_values().filter(|(_, seen)| *seen == places.len()).map(|(c, _)| c).collect()
+    }
+}
+
+/// Least and largest; (∞, −∞) for nothing.
+fn range(values: impl Iterator<Item = f32>) -> (f32, f32) {
+    values.fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
+}
+
+impl Measure {
+    fn validate(&self) -> Result<(), String> {
+        let within = |name: &str, v: f32, low: f32, high: f32| {
+            if (low..=high).contains(&v) {
+                return Ok(());
+            }
+            Err(format!("{name} is {v}; it must be within {low} and {high}"))
+        };
+        for v in self.level {
+            within("a level", v, 0.0, f32::INFINITY)?;
+        }
+        for v in self.elevation {
+            within("an elevation", v, -90.0, 90.0)?;
+        }
+        within("the upper elevation", self.elevation[1], self.elevation[0], 90.0)?;
+        within("pixel height", self.pixel_height, f32::MIN_POSITIVE, f32::MAX)?;
+        within("primitives", self.primitives, 0.0, f32::MAX)?;
+        within("bytes", self.bytes, 0.0, f32::MAX)?;
+        for v in [self.rmse, self.rmse_worst, self.flip, self.flip_worst] {
+            within("an error", v, 0.0, f32::MAX)?;
+        }
+        within("SSIM", self.ssim, -1.0, 1.0)?;
+        within("coverage", self.coverage, -1.0, f32::MAX)
     }
 }
 
@@ -187,12 +227,13 @@ impl Measures {
 pub struct Choice {
     /// As in [`Measure::level`].
     pub level: [f32; 3],
-    /// Primitives drawn, at most, in the mean over a band's views.
+    /// Primitives drawn: the mean over views of the worst band and height.
     pub primitives: f32,
-    /// The error that was asked about, at most.
+    /// The error that was asked about: the worst view of the worst band and height.
     pub error: f32,
-    /// Which of the bracketing heights it was measured at.
-    heights: u8,
+    /// The need lies beyond what was measured: the promise is that of the nearest height and
+    /// elevation.
+    pub beyond: bool,
 }
 
 #[cfg(test)]
@@ -234,7 +275,13 @@ mod tests {
 
     fn need(pixel_height: f32, elevation: Option<f32>) -> Need {
         let representation = kind::POINTS_HEADER;
-        Need { representation, pixel_height, elevation, error: ErrorKind::Flip }
+        Need {
+            representation,
+            pixel_height,
+            elevation,
+            light: Light::Albedo,
+            error: ErrorKind::Flip,
+        }
     }
 
     #[test]
@@ -250,8 +297,16 @@ mod tests {
         let between = t.cheapest(&need(100.0, Some(5.0)), 0.07).unwrap();
         assert_eq!((between.level[0], between.primitives), (1.0, 9000.0));
         assert_eq!(level(t.cheapest(&need(100.0, Some(40.0)), 1.0)), Some(1.0));
-        // Beyond all heights the nearest counts.
-        assert_eq!(level(t.cheapest(&need(2.0, Some(5.0)), 0.061)), Some(4.0));
+        assert!(!between.beyond);
+        // Beyond all heights and elevations the nearest count, and it is said.
+        let far = t.cheapest(&need(2.0, Some(5.0)), 0.061).unwrap();
+        assert_eq!((far.level[0], far.beyond), (4.0, true));
+        assert!(t.cheapest(&need(64.0, Some(90.0)), 1.0).is_some_and(|c| !c.beyond));
+        // A level that was not measured in all bands is not chosen for all.
+        assert_eq!(level(t.cheapest(&need(256.0, None), 1.0)), Some(1.0));
+        assert_eq!(level(t.cheapest(&need(256.0, Some(40.0)), 1.0)), Some(16.0));
+        let lit = Need { light: Light::Sun, ..need(64.0, None) };
+        assert_eq!(t.cheapest(&lit, 1.0), None);
         let other = Need { representation: 99, ..need(64.0, None) };
         assert_eq!(t.cheapest(&other, 1.0), None);
     }
@@ -269,9 +324,37 @@ mod tests {
     fn broken_rows_are_named() {
         let mut t = table();
         t.rows[3].flip = f32::NAN;
-        assert!(t.validate().unwrap_err().starts_with("row 3"));
+        let want = "row 3: an error is NaN; it must be within 0 and";
+        assert!(t.validate().unwrap_err().starts_with(want), "{:?}", t.validate());
+        let breaks: [fn(&mut Measure); 6] = [
+            |r| r.pixel_height = 0.0,
+            |r| r.level[1] = -1.0,
+            |r| r.elevation = [30.0, 20.0],
+            |r| r.elevation = [-91.0, 20.0],
+            |r| r.ssim = 1.5,
+            |r| r.primitives = f32::INFINITY,
+        ];
+        for change in breaks {
+            let mut t = table();
+            change(&mut t.rows[1]);
+            assert!(t.validate().unwrap_err().starts_with("row 1: "));
+        }
         let mut t = table();
-        t.rows[1].pixel_height = 0.0;
-        assert!(t.validate().unwrap_err().starts_with("row 1"));
+        t.rows = vec![t.rows[0]; MAX_ROWS + 1];
+        assert_eq!(t.validate().unwrap_err(), "4097 rows; the limit is 4096");
+        let t = Measures { method: "\u{1b}[2J".into(), ..table() };
+        assert!(t.validate().unwrap_err().contains("control characters"));
+    }
+
+    #[test]
+    fn new_rows_replace_those_of_their_representation_and_light() {
+        let mut old = table();
+        old.rows[0].representation = 99;
+        old.rows[1].light = Light::Sun;
+        let newer =
+            Measures { method: "newer".into(), rows: vec![row(2.0, 64.0, [0.0, 9.0], 1.0, 0.1)] };
+        let merged = old.merged(&newer);
+        assert_eq!(merged.rows, [old.rows[0], old.rows[1], newer.rows[0]]);
+        assert_eq!(old.without(kind::POINTS_HEADER).rows, [old.rows[0]]);
     }
 }

@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 static GOLDEN: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    std::fs::read(forest_tests::golden::all()[0].path()).expect("a golden pack")
+    std::fs::read(forest_tests::golden::richest().path()).expect("a golden pack")
 });
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {

@@ -21,15 +21,22 @@ const SHARED: [&str; 8] = [
 /// The tree whose plot the README shows.
 const PLOTTED: &str = "broadleaf_young.gltf";
 /// Other ways, with what the ratio to the pack says.
-const WAYS: [(&str, &str); 8] = [
-    ("clustering", "all of it: uniform clustering of the whole block, opaque points (Pauly 2002)"),
-    ("biased", "the paper's depth bias, k = s_m: below 1 it would gain"),
-    ("raw", "what calibration gains"),
-    ("area", "what calibration and counting hidden leaves once gain"),
-    ("opaque", "the same and opacity"),
-    ("paper", "radius, order and bias of Gilet, Meyer, Neyret 2005"),
-    ("random", "random points (Cook et al. 2007)"),
-    ("simplify", "triangles by meshoptimizer"),
+const WAYS: [(&str, &str, &str); 11] = [
+    (
+        "pack",
+        "clustering",
+        "uniform clustering of the whole block, opaque points (Pauly et al. 2002)",
+    ),
+    ("raw", "clustering", "the same, against the pack without calibration"),
+    ("pack", "bias-1/4", "the paper's depth bias, k = s_m/4: below 1 it gains"),
+    ("pack", "bias-1", "the paper's depth bias, k = s_m: below 1 it gains"),
+    ("pack", "raw", "no calibration"),
+    ("raw", "area", "hidden leaves counted as if they were seen (both without calibration)"),
+    ("raw", "opaque", "the same, and no opacity"),
+    ("pack", "paper", "radius, order and bias of Gilet, Meyer, Neyret 2005"),
+    ("pack", "random", "random points (Cook et al. 2007)"),
+    ("pack", "simplify", "triangles by meshoptimizer"),
+    ("raw", "simplify", "the same, against the pack without calibration"),
 ];
 const BEGIN: &str = "<!-- figures of `make report` -->";
 const END: &str = "<!-- end of figures -->";
@@ -130,11 +137,17 @@ fn report(found: &[Evaluation]) -> Result<String> {
     writeln!(
         t,
         "How many times the points that the pack needs: the median over the views of the geometric mean \
-         over all errors that both reach, least – most of a view in brackets; – where they share none \
-         (the pack's coarsest level is better than the other's finest, or the other way round).\n"
+         over all errors that both reach, least – most of a view in brackets; – where they share less than \
+         a factor of 1.5 in error (mostly because the pack's coarsest level is better than the other's \
+         finest). All but the pack are drawn without calibration: from 64 pixels down their error is \
+         mostly that their crowns fatten or thin, and what the pack gains is mostly that its crowns do \
+         not; the rows over `raw` tell how much is due to calibration. At 256 pixels the gain grows with \
+         how much hides within a point. In crowns of textured cards (oak, ash) and sparse trees of the \
+         sample data little does: clusters of opaque discs lose less there, and the aim of three times \
+         fewer points is met from 64 pixels down only.\n"
     )?;
-    for (way, what) in WAYS {
-        ratio_table(&mut t, found, way, what)?;
+    for (base, way, what) in WAYS {
+        ratio_table(&mut t, found, base, way, what)?;
     }
     writeln!(t, "## Levels of the packs\n")?;
     writeln!(
@@ -147,7 +160,8 @@ fn report(found: &[Evaluation]) -> Result<String> {
         t,
         "RMSE between two pictures as the level follows a camera's step of 1 % while the camera stands \
          still (popping alone; for the mesh one switch from 20 % to 10 %), the change of the truth as the \
-         camera takes the step, and what the pack changes beyond that. {} pixels high.\n",
+         camera takes the step, and what the pack changes then and the truth does not: with its switches \
+         of level, and with one cut. {} pixels high.\n",
         found.first().and_then(|e| e.popping.first()).map_or(0, |p| p.height)
     )?;
     popping_table(&mut t, found)?;
@@ -158,12 +172,18 @@ fn heights(found: &[Evaluation]) -> Vec<u32> {
     found.first().map_or(vec![], |e| e.subject.heights.clone())
 }
 
-fn ratio_table(t: &mut String, found: &[Evaluation], way: &str, what: &str) -> Result<()> {
-    writeln!(t, "### {way}: {what}\n")?;
+fn ratio_table(
+    t: &mut String,
+    found: &[Evaluation],
+    base: &str,
+    way: &str,
+    what: &str,
+) -> Result<()> {
+    writeln!(t, "### {way} over {base}: {what}\n")?;
     let columns: Vec<(Metric, u32)> = Metric::ALL
         .into_iter()
         .flat_map(|m| heights(found).into_iter().map(move |h| (m, h)))
-        .filter(|(m, h)| found.iter().any(|e| e.ratio(way, *m, *h).is_some()))
+        .filter(|(m, h)| found.iter().any(|e| e.ratio(base, way, *m, *h).is_some()))
         .collect();
     let names: Vec<String> = columns
         .iter()
@@ -174,7 +194,7 @@ fn ratio_table(t: &mut String, found: &[Evaluation], way: &str, what: &str) -> R
         let cells: Vec<String> = columns
             .iter()
             .map(|(m, h)| {
-                e.ratio(way, *m, *h).map_or("–".into(), |r| {
+                e.ratio(base, way, *m, *h).map_or("–".into(), |r| {
                     format!("**{}** ({} – {})", digits(r.median), digits(r.least), digits(r.most))
                 })
             })
@@ -230,20 +250,22 @@ fn level_table(t: &mut String, found: &[Evaluation]) -> Result<()> {
 fn popping_table(t: &mut String, found: &[Evaluation]) -> Result<()> {
     writeln!(
         t,
-        "| tree | pack, still | mesh, still | truth, moving | pack beyond the truth |\n|---|---|---|---|---|"
+        "| tree | pack, still | mesh, still | truth, moving | pack, moving | one cut, moving |\n\
+         |---|---|---|---|---|---|"
     )?;
     for e in found {
         let of = |name: &str| e.popping.iter().find(|p| p.contender == name);
         let (Some(pack), Some(mesh)) = (of("pack"), of("simplify")) else { continue };
         writeln!(
             t,
-            "| {} | {:.4} (worst {:.4}) | {:.4} | {:.4} | {:.4} |",
+            "| {} | {:.4} (worst {:.4}) | {:.4} | {:.4} | {:.4} | {} |",
             tree(e),
             pack.still,
             pack.still_worst,
             mesh.still,
             pack.truth,
-            pack.moving
+            pack.moving,
+            pack.moving_fixed.map_or("–".into(), |v| format!("{v:.4}"))
         )?;
     }
     Ok(())
@@ -253,19 +275,19 @@ fn popping_table(t: &mut String, found: &[Evaluation]) -> Result<()> {
 fn headline(found: &[Evaluation]) -> Result<String> {
     let mut t = String::from(
         "\n| tree | triangles | 256 px, equal FLIP | 256 px, equal RMSE | 64 px, equal FLIP | 64 px, equal \
-         RMSE | coverage at 64 px |\n|---|---|---|---|---|---|---|\n",
+         RMSE | coverage, worst of all levels of 1,000 points and more |\n|---|---|---|---|---|---|---|\n",
     );
     for e in found {
         let cell = |metric, height| {
-            e.ratio("clustering", metric, height)
+            e.ratio("pack", "clustering", metric, height)
                 .map_or("–".into(), |r| format!("{} ×", digits(r.median)))
         };
         let all = e.summaries();
         let coverage = all
             .iter()
-            .filter(|s| s.row.contender == "pack" && s.row.height == 64)
-            .find(|s| s.primitives <= 50_000.0)
-            .and_then(|s| s.errors.coverage_ratio);
+            .filter(|s| s.row.contender == "pack" && s.primitives >= 1000.0)
+            .filter_map(|s| s.errors.coverage_ratio)
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()));
         writeln!(
             t,
             "| {} | {} | {} | {} | {} | {} | {} |",

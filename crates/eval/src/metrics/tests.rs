@@ -34,6 +34,8 @@ fn every_metric_is_that_of_its_reference_implementation() {
         let (w, h) = (n("width") as u32, n("height") as u32);
         let [a, b] = [0, 1].map(|k| made(n("case") as i64, k, w, h));
         let e = Comparison::new(&a, &b).errors(BACKGROUND, 1.0);
+        let [c2, d] = [2, 3].map(|k| made(n("case") as i64, k, w, h));
+        let popped = popping([&a, &b], [&c2, &d]);
         for (key, got, tolerance) in [
             ("rmse", e.rmse, 1e-9),
             ("psnr", e.psnr.unwrap(), 1e-7),
@@ -43,6 +45,7 @@ fn every_metric_is_that_of_its_reference_implementation() {
             ("coverage_ratio", e.coverage_ratio.unwrap(), 1e-9),
             ("silhouette_iou", e.silhouette_iou, 1e-9),
             ("depth", e.depth.unwrap(), 1e-9),
+            ("popping", popped, 1e-7),
         ] {
             assert!((got - n(key)).abs() < tolerance, "{key} of {w}×{h}: {got}, want {}", n(key));
         }
@@ -110,11 +113,18 @@ fn popping_is_what_the_truth_does_not_do() {
     let (a, b, c) = (flat(0.2), flat(0.3), flat(0.5));
     // The truth changes by 0.1 in three of four channels, the test by 0.3.
     let want = 0.2 * 0.75f64.sqrt();
-    assert!((popping([&a, &b], [&a, &c]) - 0.0).abs() > 0.1);
     assert!((popping([&a, &b], [&a, &c]) - want).abs() < 1e-6);
-    assert_eq!(popping([&a, &c], [&a, &b]), 0.0);
+    assert!((popping([&a, &c], [&a, &b]) - want).abs() < 1e-6);
+    // A constant error is no popping.
+    assert!(popping([&a, &b], [&b, &flat(0.4)]) < 1e-6);
     let empty = Picture::empty(10, 10);
     assert_eq!(popping([&empty, &empty], [&empty, &empty]), 0.0);
+    // A pop of one pixel is seen although the truth moves far more.
+    let mut popped = made(9, 1, 64, 48);
+    let (t0, t1) = (made(9, 0, 64, 48), popped.clone());
+    popped.pixels[24 * 64 + 30] = [1.0, 0.0, 0.0, 1.0];
+    assert_eq!(popping([&t0, &t1], [&t0, &t1]), 0.0);
+    assert!(popping([&t0, &t1], [&t0, &popped]) > 0.001);
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub fn csv(e: &Evaluation) -> String {
             c.primitives,
             c.bytes,
             some(c.select_ns),
-            c.render_ms,
+            some(c.render_ms),
             x.rmse,
             some(x.psnr),
             x.ssim,

@@ -4,7 +4,9 @@ use crate::contender::{Contender, Knob};
 use crate::error::EvalError;
 use crate::frame::held_out_views;
 use crate::metrics::{Comparison, Errors};
-use crate::sweep::{BACKGROUND, Plan, Row, Sweep, Truth};
+use crate::plan::{BACKGROUND, Plan};
+use crate::sweep::{Row, Sweep};
+use crate::truth::Truth;
 use forest_raster::{Picture, Style};
 use image::{ImageFormat, RgbImage};
 use std::io::Cursor;
@@ -17,7 +19,7 @@ pub struct Exhibit {
     pub knob: Knob,
     /// Primitives drawn.
     pub primitives: f64,
-    /// Its errors.
+    /// Errors of the picture that is shown: drawn at its own height.
     pub errors: Errors,
     /// Source, level, difference × 2 and FLIP heat, cropped to what they show.
     pub pictures: [Vec<u8>; 4],
@@ -58,12 +60,17 @@ pub fn gallery(
         let rows = of(c.name);
         let Some(row) = rows.iter().min_by(|a, b| far(a).total_cmp(&far(b))) else { continue };
         let (picture, _) = c.draw(&camera, row.knob, &style);
-        exhibits.push(exhibit(row, &source, &picture)?);
+        exhibits.push(exhibit(row, &source, &picture, truth.frame.radius)?);
     }
     Ok(exhibits)
 }
 
-fn exhibit(row: &Row, source: &Picture, picture: &Picture) -> Result<Exhibit, EvalError> {
+fn exhibit(
+    row: &Row,
+    source: &Picture,
+    picture: &Picture,
+    radius: f64,
+) -> Result<Exhibit, EvalError> {
     let comparison = Comparison::new(source, picture);
     let (a, b) = comparison.pictures();
     let shown = [a, b].map(|p| p.over(BACKGROUND));
@@ -79,7 +86,7 @@ fn exhibit(row: &Row, source: &Picture, picture: &Picture) -> Result<Exhibit, Ev
         contender: row.contender.clone(),
         knob: row.knob,
         primitives: row.cost.primitives,
-        errors: row.errors,
+        errors: comparison.errors(BACKGROUND, radius),
         pictures: [encode(source)?, encode(level)?, encode(difference)?, encode(heat)?],
     })
 }

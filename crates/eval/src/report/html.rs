@@ -116,7 +116,7 @@ fn ratio_table(t: &mut String, e: &Evaluation) {
         for c in e.contenders.iter().filter(|c| c.name != "pack") {
             let mut cells = vec![escape(&c.name)];
             for &h in &e.subject.heights {
-                cells.push(e.ratio(&c.name, metric, h).map_or("–".into(), |r| {
+                cells.push(e.ratio("pack", &c.name, metric, h).map_or("–".into(), |r| {
                     format!("<b>{} ×</b> ({} – {})", short(r.median), short(r.least), short(r.most))
                 }));
             }
@@ -193,7 +193,7 @@ fn level_table(t: &mut String, e: &Evaluation) {
                 count(x.primitives),
                 count(x.bytes),
                 some(r.cost.select_ns.map(|v| v / 1e3)),
-                short(r.cost.render_ms),
+                some(r.cost.render_ms),
                 short(c.flip),
                 short(x.worst[0]),
                 short(c.rmse),
@@ -215,31 +215,27 @@ fn popping_table(t: &mut String, e: &Evaluation) {
         first.height,
         short(first.truth)
     );
-    head(
-        t,
-        &title,
-        &[
-            "way",
-            "setting",
-            "level switches, camera still",
-            "worst",
-            "camera moves, beyond the truth",
-            "worst",
-        ],
-    );
+    let cells = [
+        "way",
+        "setting",
+        "level switches, camera still",
+        "worst",
+        "camera moves: what the truth does not do",
+        "worst",
+        "the same with one cut",
+    ];
+    head(t, &title, &cells);
     for p in &e.popping {
-        row(
-            t,
-            "td",
-            &[
-                escape(&p.contender),
-                knob(p.knob),
-                short(p.still),
-                short(p.still_worst),
-                short(p.moving),
-                short(p.moving_worst),
-            ],
-        );
+        let cells = [
+            escape(&p.contender),
+            knob(p.knob),
+            short(p.still),
+            short(p.still_worst),
+            short(p.moving),
+            short(p.moving_worst),
+            p.moving_fixed.map_or("–".into(), short),
+        ];
+        row(t, "td", &cells);
     }
     put(t, "</table>\n");
 }

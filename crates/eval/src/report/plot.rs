@@ -21,7 +21,7 @@ impl Axis {
         match self {
             Self::Primitives => s.primitives,
             Self::Bytes => s.bytes,
-            Self::Milliseconds => s.row.cost.render_ms,
+            Self::Milliseconds => s.row.cost.render_ms.unwrap_or(0.0),
         }
     }
 
@@ -54,10 +54,12 @@ struct Line<'a> {
     index: usize,
     name: &'a str,
     points: Vec<(f64, f64)>,
+    /// Costs of what has no error: the source itself.
+    exact: Vec<f64>,
 }
 
 /// An SVG of error against cost at one height, both logarithmic: a line for each contender, a dot
-/// for each setting, means over the views.
+/// for each setting, means over the views; an upright line for what has no error.
 ///
 /// # Errors
 /// When the plot cannot be laid out: a bug.
@@ -68,16 +70,19 @@ pub fn plot(e: &Evaluation, height: u32, metric: Metric, axis: Axis) -> Result<S
         .iter()
         .enumerate()
         .map(|(index, c)| {
-            let own = summaries.iter().filter(|s| s.row.contender == c.name);
+            let is = |s: &&Summary| s.row.contender == c.name && s.row.height == height;
+            let own: Vec<&Summary> = summaries.iter().filter(is).collect();
             let mut points: Vec<(f64, f64)> = own
-                .filter(|s| s.row.height == height)
+                .iter()
                 .map(|s| (axis.of(s), metric.of(&s.errors)))
                 .filter(|(x, y)| *x > 0.0 && *y > 0.0)
                 .collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            Line { index, name: &c.name, points }
+            let exact = own.iter().filter(|s| metric.of(&s.errors) == 0.0);
+            let exact = exact.map(|s| axis.of(s)).filter(|x| *x > 0.0).collect();
+            Line { index, name: &c.name, points, exact }
         })
-        .filter(|l| !l.points.is_empty())
+        .filter(|l| !l.points.is_empty() || !l.exact.is_empty())
         .collect();
     let mut svg = String::new();
     draw(&mut svg, &lines, height, metric, axis).map_err(EvalError::Report)?;
@@ -92,24 +97,27 @@ fn draw(
     axis: Axis,
 ) -> Result<(), String> {
     let all = || lines.iter().flat_map(|l| l.points.iter().copied());
-    let range = |of: fn((f64, f64)) -> f64| {
-        let low = all().map(of).fold(f64::INFINITY, f64::min);
-        let high = all().map(of).fold(0.0, f64::max);
+    fn around(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+        let (low, high) =
+            values.fold((f64::INFINITY, 0.0f64), |(low, high), v| (low.min(v), high.max(v)));
         if high > 0.0 { low * 0.8..high * 1.25 } else { 0.1..1.0 }
-    };
+    }
+    let costs = all().map(|p| p.0).chain(lines.iter().flat_map(|l| l.exact.iter().copied()));
+    let (xs, ys) = (around(costs), around(all().map(|p| p.1)));
     let failed = |e: &dyn std::fmt::Display| e.to_string();
-    let root = SVGBackend::with_string(svg, (560, 380)).into_drawing_area();
+    let root = SVGBackend::with_string(svg, (640, 380)).into_drawing_area();
     root.fill(&WHITE).map_err(|e| failed(&e))?;
+    let (left, right) = root.split_horizontally(540);
     let name = match metric {
         Metric::Flip => "mean FLIP",
         Metric::Rmse => "RMSE",
     };
-    let mut chart = ChartBuilder::on(&root)
+    let mut chart = ChartBuilder::on(&left)
         .caption(format!("{name}, tree {height} pixels high"), ("sans-serif", 15))
         .margin(8)
         .x_label_area_size(38)
         .y_label_area_size(52)
-        .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())
+        .build_cartesian_2d(xs.log_scale(), ys.clone().log_scale())
         .map_err(|e| failed(&e))?;
     chart
         .configure_mesh()
@@ -122,28 +130,27 @@ fn draw(
         .label_style(("sans-serif", 12))
         .draw()
         .map_err(|e| failed(&e))?;
-    for Line { index, name, points } in lines {
+    for Line { index, points, exact, .. } in lines {
         let color = COLORS[index % COLORS.len()];
         let width = if *index == 0 { 3 } else { 1 };
         chart
             .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(width)))
-            .map_err(|e| failed(&e))?
-            .label(*name)
-            .legend(move |(x, y)| {
-                PathElement::new([(x, y), (x + 16, y)], color.stroke_width(width.max(2)))
-            });
+            .map_err(|e| failed(&e))?;
+        // What has no error has no place on a logarithmic axis: a line from top to bottom.
+        let upright = exact.iter().map(|&x| PathElement::new([(x, ys.start), (x, ys.end)], color));
+        chart.draw_series(upright).map_err(|e| failed(&e))?;
         chart
             .draw_series(points.iter().map(|p| Circle::new(*p, 3, color.filled())))
             .map_err(|e| failed(&e))?;
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(215, 215, 215))
-        .label_font(("sans-serif", 12))
-        .draw()
-        .map_err(|e| failed(&e))?;
+    // The legend stands beside the plot, where it hides nothing.
+    for (row, Line { index, name, .. }) in (0..).zip(lines) {
+        let (color, y) = (COLORS[index % COLORS.len()], 40 + 18 * row);
+        let dash = PathElement::new([(0, y), (16, y)], color.stroke_width(3));
+        right.draw(&dash).map_err(|e| failed(&e))?;
+        let label = Text::new(*name, (22, y - 6), ("sans-serif", 12));
+        right.draw(&label).map_err(|e| failed(&e))?;
+    }
     root.present().map_err(|e| failed(&e))
 }
 

@@ -52,7 +52,7 @@ pub fn text(e: &Evaluation) -> Result<String, Error> {
             100.0 * c.coverage_ratio.unwrap_or(0.0),
             c.silhouette_iou,
             c.depth.map_or("-".into(), short),
-            short(x.row.cost.render_ms),
+            x.row.cost.render_ms.map_or("-".into(), short),
         )?;
     }
     if !e.ratios.is_empty() {
@@ -61,7 +61,7 @@ pub fn text(e: &Evaluation) -> Result<String, Error> {
             "\nprimitives of other ways for the pack's error: median over views (least – most)"
         )?;
         writeln!(t, "{:<11} {:>5} {:>7} {:>9}", "", "", "height", "ratio")?;
-        for r in &e.ratios {
+        for r in e.ratios.iter().filter(|r| r.base == "pack") {
             writeln!(
                 t,
                 "{:<11} {:>5} {:>7} {:>9} ({} – {})",
@@ -78,19 +78,21 @@ pub fn text(e: &Evaluation) -> Result<String, Error> {
         writeln!(
             t,
             "\nchange of the picture, RMSE: as the level follows a step of 1 % with the camera still \
-             (a mesh: one switch of level);\nbeyond the truth's own {} as the camera takes the step",
+             (a mesh: one switch of level);\nas the camera takes the step, what the truth (changing by {}) \
+             does not do, and with one cut for all steps",
             e.popping.first().map_or("0".into(), |p| short(p.truth))
         )?;
         for p in &e.popping {
             writeln!(
                 t,
-                "{:<11} {:<18} {:>8} (worst {}); {:>7} (worst {})",
+                "{:<11} {:<18} {:>8} (worst {}); {:>7} (worst {}, one cut {})",
                 p.contender,
                 knob(p.knob),
                 short(p.still),
                 short(p.still_worst),
                 short(p.moving),
-                short(p.moving_worst)
+                short(p.moving_worst),
+                p.moving_fixed.map_or("-".into(), short)
             )?;
         }
     }

@@ -2,7 +2,6 @@
 
 use forest_soup::{Bounds, TriangleSoup};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Maps soup positions to block space: `(p − center) · 2^−exponent`, in `f64`.
 ///
@@ -21,21 +20,7 @@ pub(crate) struct BlockFrame {
 impl BlockFrame {
     /// The frame of all finite triangles; `None` if there is none, or all are one point.
     pub(crate) fn of(soup: &TriangleSoup) -> Option<Self> {
-        let bounds = (0..soup.triangles.len())
-            .into_par_iter()
-            .with_min_len(1 << 14)
-            .fold(
-                || Bounds::EMPTY,
-                |b, i| {
-                    let corners = soup.corners(i);
-                    if corners.iter().all(|p| p.is_finite()) {
-                        corners.iter().fold(b, |b, p| b.with(p.as_dvec3()))
-                    } else {
-                        b
-                    }
-                },
-            )
-            .reduce(|| Bounds::EMPTY, Bounds::union);
+        let bounds = soup.bounds();
         let half = bounds.half_diagonal();
         if bounds.is_empty() || half == 0.0 {
             return None;

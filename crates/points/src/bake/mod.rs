@@ -26,6 +26,7 @@ use crate::header::{BakeCounts, CellRecord, PointsHeader};
 use crate::materials::write_materials;
 use crate::options::{BakeOptions, Order};
 use crate::size::SizeCode;
+use crate::validate::MOST_CELLS;
 use forest_pack::{Codec, PackError, PackWriter, SectionId, Spool, header, kind};
 use forest_soup::{Bounds, InvalidSoup, TriangleSoup};
 use rayon::prelude::*;
@@ -211,7 +212,7 @@ fn check(options: &BakeOptions) -> Result<(), BakeError> {
         return fail("--alpha-tolerance", t.to_string(), "between 0 and 1");
     }
     if let crate::GridChoice::Fixed(n) = options.grid
-        && (n.contains(&0) || cells_of(n).is_none_or(|cells| cells > 1 << 20))
+        && (n.contains(&0) || cells_of(n).is_none_or(|cells| cells > MOST_CELLS))
     {
         return fail(
             "--grid",

@@ -13,6 +13,7 @@ mod slices;
 use self::slices::Slices;
 use crate::bake::frame::BlockFrame;
 use crate::options::{BakeOptions, SurfelSize};
+use crate::validate::SMALLEST_SURFEL;
 use forest_soup::{AlphaMode, Material, ShadedTexture, TriangleSoup};
 use glam::{DVec3, Vec2};
 use rayon::prelude::*;
@@ -111,7 +112,7 @@ impl<'a> SurfelShader<'a> {
                 (b.y / 256.0).max(b.length() / 4096.0)
             }
             SurfelSize::Triangle => f64::INFINITY,
-            SurfelSize::Units(s) => frame.length(s).max(f64::MIN_POSITIVE),
+            SurfelSize::Units(s) => frame.length(s).max(SMALLEST_SURFEL),
         };
         Self { soup, frame, shades, size, tolerance: options.alpha_tolerance }
     }
