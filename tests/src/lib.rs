@@ -1,6 +1,7 @@
 //! What tests, the golden packs and the fuzz targets share.
 
 pub mod golden;
+pub mod reference;
 pub mod soups;
 
 use forest_draw::{draw_points, read_surfaces};
