@@ -49,6 +49,7 @@ mod block;
 mod calibration;
 mod header;
 mod materials;
+mod open;
 mod options;
 pub mod record;
 mod select;
