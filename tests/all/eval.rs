@@ -202,7 +202,7 @@ fn chosen_levels_keep_their_promise() {
         ..Plan::default()
     };
     let contenders = own_contenders(&block, Some(&surfaces));
-    let found = sweep(&truth, &contenders[..1], &plan, &|_| {}).unwrap();
+    let found = sweep(&truth, &contenders, &plan, &|_| {}).unwrap();
     let table: Measures = measures(&found, &plan);
     // Judged pictures as smooth as the measured ones, whose samples are box-filtered from 128 pixels.
     let style = Style { sampling: Sampling { side: 16, seed: 3 }, ..Style::default() };
@@ -225,7 +225,8 @@ fn chosen_levels_keep_their_promise() {
             let (picture, drawn) = draw_points(&block, Some(&surfaces), &camera, &t, &style);
             let error = Comparison::new(&source, &picture).errors(BACKGROUND, 1.0).rmse;
             assert!(choice.error <= within);
-            assert!(error <= f64::from(choice.error) * 1.15, "{height}: {error} {choice:?}");
+            // A thousandth: what other samples make of edges.
+            assert!(error <= f64::from(choice.error) * 1.15 + 1e-3, "{height}: {error} {choice:?}");
             let primitives = drawn.primitives() as f32;
             assert!(primitives <= choice.primitives * 1.15 + 8.0, "{primitives} {choice:?}");
             chosen += 1;
@@ -294,6 +295,7 @@ fn reports_are_whole_and_need_no_network() {
         names,
         [
             "pack",
+            "triangles",
             "bias-1/4",
             "bias-1",
             "area",
@@ -317,8 +319,8 @@ fn reports_are_whole_and_need_no_network() {
     // The namespace of SVG is a name, not an address.
     let addresses = html.replace("http://www.w3.org/2000/svg", "");
     assert!(!addresses.contains("http") && !html.contains("<script"));
-    assert_eq!(html.matches("<figure>").count(), 10);
-    assert_eq!(html.matches("src=\"data:image/png;base64,").count(), 40);
+    assert_eq!(html.matches("<figure>").count(), 11);
+    assert_eq!(html.matches("src=\"data:image/png;base64,").count(), 44);
     assert_eq!(html.matches("<svg").count(), 8);
     assert!(svg.starts_with("<svg"));
 
@@ -330,9 +332,11 @@ fn reports_are_whole_and_need_no_network() {
     assert!(inspected["measures"]["rows"].as_array().unwrap().len() >= 12);
     let png = arg(&dir.path().join("t.png"));
     let (code, _, err) = run(&["draw", &pack, "-o", &png, "--size", "64", "--budget", "2000"]);
+    assert!(code == 0 && err.contains("points"), "{err}");
+    let (code, _, err) = run(&["draw", &pack, "-o", &png, "--size", "64", "--error", "0.2"]);
     assert!(code == 0 && err.contains("chosen at"), "{err}");
-    let (code, _, err) = run(&["draw", &pack, "-o", &png, "--size", "64", "--error", "0.0001"]);
-    assert!(code == 1 && err.contains("no measured level"), "{err}");
+    let (code, _, err) = run(&["draw", &pack, "-o", &png, "--size", "64", "--error", "1e-9"]);
+    assert!(code == 4 && err.contains("no measured level has FLIP 0.000000001"), "{err}");
 }
 
 #[test]
@@ -343,14 +347,22 @@ fn wrong_sources_and_plans_are_refused() {
         (arg(&repo("sample-data/shrub.obj")), arg(&repo("sample-data/conifer.glb")));
     succeed(&["points", &shrub, "-o", &pack, "-q", "--surfel-size", "0.1"]);
     let (code, _, err) = run(&["eval", &pack, "--source", &conifer]);
-    assert!(code == 1 && err.contains("another source (shrub.obj)"), "{err}");
+    assert!(code == 1 && err.contains("another source") && err.contains("shrub.obj"), "{err}");
     let (code, _, err) = run(&["eval", &pack, "--source", &shrub, "--heights", "64,24"]);
     assert!(code == 1 && err.contains("divisors") && err.contains("[64, 24]"), "{err}");
     let (code, _, err) = run(&["eval", &pack, "--source", &shrub, "--s-m", "0"]);
     assert!(code == 1 && err.contains("--s-m"), "{err}");
     let png = arg(&dir.path().join("t.png"));
     let (code, _, err) = run(&["draw", &pack, "-o", &png, "--error", "0.1"]);
-    assert!(code == 1 && err.contains("no measured table"), "{err}");
+    assert!(code == 4 && err.contains("no measured table"), "{err}");
+    // What is not a report is not written over.
+    let before = std::fs::read(&pack).unwrap();
+    let (code, _, err) = run(&["eval", &pack, "--source", &shrub, "--html", &pack]);
+    assert!(code == 1 && err.contains("is written as .html"), "{err}");
+    assert!(std::fs::read(&pack).unwrap() == before);
+    let nowhere = arg(&dir.path().join("nowhere/t.csv"));
+    let (code, _, err) = run(&["eval", &pack, "--source", &shrub, "--csv", &nowhere]);
+    assert!(code == 2 && err.contains("nowhere/t.csv: its folder"), "{err}");
 }
 
 #[test]

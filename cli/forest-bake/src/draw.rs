@@ -3,11 +3,11 @@
 use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use forest_draw::{draw_points, read_surfaces};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
-use forest_points::{PixelArea, PointsBlock, Thresholds};
+use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
 use forest_raster::{Picture, Sampling, Style};
 use forest_soup::{Camera, Projection};
 use glam::DVec3;
@@ -42,13 +42,15 @@ pub(crate) struct Args {
     /// k, added to both at the back of the block and taken from them at its front.
     #[arg(long, default_value_t = 0.0, value_name = "PX2", allow_hyphen_values = true)]
     bias: f64,
-    /// Choose the cheapest level whose FLIP error under base colours is at most this, by the pack's
-    /// measured table (`points --measure`).
-    #[arg(long, value_name = "FLIP", conflicts_with_all = ["finest", "largest", "bias", "budget"])]
+    /// Choose the cheapest level whose FLIP error is at most this in all measured views, by the
+    /// pack's table (`points --measure`, `eval --embed`).
+    #[arg(long, value_name = "FLIP", value_parser = positive)]
+    #[arg(conflicts_with_all = ["finest", "largest", "bias", "budget"])]
     error: Option<f32>,
-    /// Choose the best level with at most this many primitives, by the measured table.
-    #[arg(long, value_name = "N", conflicts_with_all = ["finest", "largest", "bias"])]
-    budget: Option<f32>,
+    /// Draw the finest cut of at most this many points and triangles.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(conflicts_with_all = ["finest", "largest", "bias"])]
+    budget: Option<u64>,
     /// Light, without shadows.
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
@@ -58,6 +60,15 @@ pub(crate) struct Args {
     /// Straight alpha instead of a grey background.
     #[arg(long)]
     alpha: bool,
+}
+
+/// s_M over s_m, if not given.
+const LARGEST_RATIO: f64 = 16.0;
+
+/// A number above zero.
+fn positive(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| "not a number".to_string())?;
+    if value > 0.0 { Ok(value) } else { Err("it must be above 0".into()) }
 }
 
 /// Linear grey behind the tree.
@@ -101,43 +112,45 @@ impl Args {
         camera: &Camera,
         quiet: bool,
     ) -> Result<Vec<Thresholds>> {
-        let Some(limit) = self.error.or(self.budget) else {
+        if let Some(most) = self.budget {
+            let found = within_budget(block, camera, LARGEST_RATIO, most);
+            let (thresholds, _) = found.with_context(|| {
+                format!("{}: no cut has {most} primitives or fewer", self.pack.display())
+            })?;
+            return Ok(vec![thresholds]);
+        }
+        let Some(limit) = self.error else {
             let thresholds = |&finest: &f64| Thresholds {
                 finest: PixelArea(finest),
-                largest: PixelArea(self.largest.unwrap_or(16.0 * finest)),
+                largest: PixelArea(self.largest.unwrap_or(LARGEST_RATIO * finest)),
                 depth_bias: PixelArea(self.bias),
             };
             return Ok(self.finest.iter().map(thresholds).collect());
         };
         let name = self.pack.display();
         let Some(table) = Measures::read(pack)? else {
-            let hint = "bake it with --measure, or `forest-bake eval --embed`";
-            return Err(Usage(format!("{name}: has no measured table; {hint}")).into());
+            bail!(
+                "{name}: has no measured table; bake it with --measure, or `forest-bake eval --embed`"
+            );
         };
         let need = block.need(camera, ErrorKind::Flip);
-        let choice = match self.error {
-            Some(_) => table.cheapest(&need, limit),
-            None => table.best_within(&need, limit),
-        };
-        let Some(choice) = choice else {
+        let Some(choice) = table.cheapest(&need, limit) else {
             let least = table.best_within(&need, f32::INFINITY).map_or(f32::NAN, |c| c.error);
-            let fewest = table.cheapest(&need, f32::INFINITY).map_or(f32::NAN, |c| c.primitives);
-            let problem = format!(
-                "no measured level does that at {:.0} pixels (the least FLIP is {least:.4}, the fewest \
-                 primitives {fewest:.0})",
-                need.pixel_height
+            let pixels = need.pixel_height;
+            bail!(
+                "{name}: no measured level has FLIP {limit} at {pixels:.0} pixels; the least is {least:.4}"
             );
-            return Err(Usage(format!("{name}: {problem}")).into());
         };
         if !quiet {
             eprintln!(
-                "chosen at {:.0} pixels: FLIP at most {:.4}, about {:.0} primitives",
-                need.pixel_height, choice.error, choice.primitives
+                "chosen at {:.0} pixels: FLIP {:.4} in the worst measured view, under base colours",
+                need.pixel_height, choice.error
             );
             if choice.beyond {
+                let (low, high) = table.heights(&need);
                 eprintln!(
-                    "warning: {name}: not measured at this height or elevation: these are the figures \
-                     of the nearest (see `forest-bake inspect`)"
+                    "warning: {name}: measured from {low} to {high} pixels: these are the figures of \
+                     the nearest height and elevation"
                 );
             }
         }

@@ -79,6 +79,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let path = args.pack.as_deref().context("no pack")?;
     let plan = args.plan();
     plan.check()?;
+    for (file, extension) in [(&args.csv, "csv"), (&args.html, "html"), (&args.svg, "svg")] {
+        file.as_deref().map_or(Ok(()), |file| output::check_target(file, extension))?;
+    }
     let start = Instant::now();
     let pack = Pack::open(path)?;
     let source = args.import.load(&args.source, quiet)?;
@@ -101,11 +104,15 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         Some(_) => report::gallery(&truth, &contenders, &plan, &found)?,
         None => vec![],
     };
-    if args.embed {
-        embed(&pack, path, &measures(&found, &plan), None)?;
-    }
+    let table = args.embed.then(|| measures(&found, &plan));
     let subject = subject(path, &pack, &block, &source, start.elapsed().as_secs_f64());
     let evaluation = Evaluation::new(subject, &plan, &contenders, found);
+    let text = if args.json {
+        serde_json::to_string_pretty(&evaluation)? + "\n"
+    } else {
+        report::text(&evaluation)?
+    };
+    output::print(&text)?;
     if let Some(file) = &args.csv {
         output::write_file(file, report::csv(&evaluation).as_bytes())?;
     }
@@ -117,12 +124,19 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         let svg = report::plot(&evaluation, height, Metric::Flip, Axis::Primitives)?;
         output::write_file(file, svg.as_bytes())?;
     }
-    let text = if args.json {
-        serde_json::to_string_pretty(&evaluation)? + "\n"
-    } else {
-        report::text(&evaluation)?
-    };
-    Ok(output::print(&text)?)
+    // Last: nothing of the above touches the pack if it fails.
+    if let Some(table) = table {
+        embed(&pack, path, &table, None)?;
+        if !quiet {
+            eprintln!(
+                "{}: wrote {} measured rows ({})",
+                path.display(),
+                table.rows.len(),
+                table.method
+            );
+        }
+    }
+    Ok(())
 }
 
 impl Args {
@@ -180,10 +194,9 @@ pub(crate) fn measure(pack: &Path, target: &Path, soup: &TriangleSoup, quiet: bo
     bar.finish_and_clear();
     block.calibration = Some(found.calibration.clone());
     let surfaces = read_surfaces(&pack, &block)?;
-    let mut contenders = own_contenders(&block, surfaces.as_ref());
     // Without depth bias: on most trees it gains nothing at equal error (docs/REPORT.md). A table
     // with it comes from `eval --embed`.
-    contenders.truncate(1);
+    let contenders = own_contenders(&block, surfaces.as_ref());
     let table = measures(&judge.sweep(&truth, &contenders)?, &plan);
     embed(&pack, target, &table, Some(&found.calibration))
 }
@@ -216,9 +229,22 @@ fn refuse_other_source(pack: &Pack, source: &LoadedSource) -> Result<()> {
     if meta.source_hash == source.meta.source_hash {
         return Ok(());
     }
-    let known: Vec<&str> = meta.sources.iter().map(|s| s.name.as_str()).collect();
-    let name = pack.path().display();
-    Err(Usage(format!("{name}: was baked from another source ({})", known.join(", "))).into())
+    let known: Vec<String> = meta
+        .sources
+        .iter()
+        .map(|s| {
+            if s.placement.is_empty() {
+                s.name.clone()
+            } else {
+                format!("{} at {}", s.name, s.placement)
+            }
+        })
+        .collect();
+    let problem = format!(
+        "was baked from another source, placement or order of trees: from {} (see `forest-bake inspect`)",
+        known.join(", ")
+    );
+    Err(Usage(format!("{}: {problem}", pack.path().display())).into())
 }
 
 fn subject(

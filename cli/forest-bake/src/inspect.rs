@@ -164,7 +164,7 @@ fn measures_text(m: &Measures, t: &mut String) -> std::fmt::Result {
     writeln!(
         t,
         "  {:>6} {:>6} {:>10} {:>8} {:>11} {:>8} {:>8} {:>9}",
-        "light", "height", "s_m, px²", "k, px²", "primitives", "FLIP ≤", "RMSE ≤", "coverage"
+        "light", "height", "s_m, px²", "k, px²", "primitives", "FLIP max", "RMSE max", "coverage"
     )?;
     let mut lines: BTreeMap<_, Vec<&Measure>> = BTreeMap::new();
     for r in m.rows.iter().filter(|r| r.representation == kind::POINTS_HEADER) {

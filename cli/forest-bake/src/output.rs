@@ -1,5 +1,6 @@
 //! Data on stdout, everything else on stderr.
 
+use crate::failure::Usage;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{ErrorKind, Write};
@@ -35,12 +36,18 @@ pub(crate) fn count(n: u64) -> String {
     indicatif::HumanCount(n).to_string()
 }
 
-/// A hidden folder beside a file, which goes when it is dropped.
-pub(crate) fn folder_beside(path: &Path) -> Result<tempfile::TempDir> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let made =
-        tempfile::Builder::new().prefix(".fpack-").tempdir_in(folder.unwrap_or(Path::new(".")));
-    made.with_context(|| format!("{}: cannot create a folder beside it", path.display()))
+/// Whether a file of this extension can be written there: before hours of work, not after.
+pub(crate) fn check_target(path: &Path, extension: &str) -> Result<()> {
+    let name = path.display();
+    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case(extension)) {
+        return Err(Usage(format!("{name}: is written as .{extension}")).into());
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let there = std::fs::metadata(folder).with_context(|| format!("{name}: its folder"))?;
+    if !there.is_dir() {
+        return Err(Usage(format!("{name}: {} is not a folder", folder.display())).into());
+    }
+    Ok(())
 }
 
 /// Writes a file whole or not at all.

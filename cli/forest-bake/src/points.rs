@@ -65,8 +65,13 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let source = args.source.load(quiet)?;
     let kept = existing(args, &source.meta)?;
     let options = args.bake_options(source.trees)?;
+    let measured = |p: &Pack| p.contains(SectionId::new(kind::POINTS_CALIBRATION, 0));
+    if kept.as_ref().is_some_and(measured) && !args.measure && !quiet {
+        let name = args.output.display();
+        eprintln!("warning: {name}: was measured and calibrated; the new one is not (--measure)");
+    }
     // A pack that is to be measured takes its name only once it is.
-    let unmeasured = if args.measure { Some(output::folder_beside(&args.output)?) } else { None };
+    let unmeasured = if args.measure { Some(tempfile::tempdir()?) } else { None };
     let baked = match &unmeasured {
         Some(folder) => folder.path().join("unmeasured.fpack"),
         None => args.output.clone(),

@@ -87,6 +87,10 @@ impl<'s> Baselines<'s> {
             way: Way::Points { block, surfaces, bias, look },
         };
         let mut all = own_contenders(block, surfaces);
+        let what = "the pack with depth bias k = s_m/4: coarser behind, finer in front";
+        all.push(points("bias-1/4", what, block, 0.25, Look::Translucent));
+        let what = "the pack with depth bias k = s_m";
+        all.push(points("bias-1", what, block, 1.0, Look::Translucent));
         let what = "the pack without its calibration";
         all.extend(raw.map(|raw| points("raw", what, raw, 0.0, Look::Translucent)));
         all.extend([
@@ -140,25 +144,18 @@ impl<'s> Baselines<'s> {
     }
 }
 
-/// The pack without and with depth bias.
+/// The pack, and its triangles if it has some.
 pub fn own_contenders<'a>(
     block: &'a PointsBlock<'a>,
     surfaces: Option<&'a Surfaces>,
 ) -> Vec<Contender<'a>> {
-    let points = |name, what, bias| Contender {
-        name,
-        what,
-        way: Way::Points { block, surfaces, bias, look: Look::Translucent },
-    };
-    vec![
-        points("pack", "the pack as it is drawn by default, k = 0", 0.0),
-        points(
-            "bias-1/4",
-            "the pack with depth bias k = s_m/4: coarser behind, finer in front",
-            0.25,
-        ),
-        points("bias-1", "the pack with depth bias k = s_m", 1.0),
-    ]
+    let way = Way::Points { block, surfaces, bias: 0.0, look: Look::Translucent };
+    let mut own = vec![Contender { name: "pack", what: "the pack as it is drawn, k = 0", way }];
+    if let Some(surfaces) = surfaces {
+        let way = Way::Triangles { block, surfaces };
+        own.push(Contender { name: "triangles", what: "the pack's triangles, no points", way });
+    }
+    own
 }
 
 fn baked(soup: &TriangleSoup, options: &BakeOptions) -> Result<Pack, EvalError> {

@@ -30,6 +30,8 @@ pub(crate) enum Way<'a> {
         bias: f64,
         look: Look,
     },
+    /// All triangles of a pack.
+    Triangles { block: &'a PointsBlock<'a>, surfaces: &'a Surfaces },
     /// A random part of the finest points, enlarged to keep their area.
     RandomPoints { block: &'a PointsBlock<'a> },
     /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
@@ -114,6 +116,7 @@ impl Contender<'_> {
                 .iter()
                 .map(|&s| Knob::Points { s_m: s, s_max: LARGEST_RATIO * s, k: bias * s })
                 .collect(),
+            Way::Triangles { .. } => vec![Knob::Points { s_m: 0.0, s_max: 0.0, k: 0.0 }],
             Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),
             Way::Meshes { levels, .. } => levels.iter().map(|l| Knob::Share(l.0)).collect(),
         }
@@ -125,6 +128,10 @@ impl Contender<'_> {
             (Way::Points { block, surfaces, look, .. }, knob) => {
                 let thresholds = knob.thresholds().expect("points have thresholds");
                 draw_points(block, *surfaces, camera, thresholds, *look, style)
+            }
+            (Way::Triangles { block, surfaces }, _) => {
+                let (all, look) = (Thresholds::TRIANGLES, Look::Translucent);
+                draw_points(block, Some(*surfaces), camera, all, look, style)
             }
             (Way::RandomPoints { block }, Knob::Share(share)) => {
                 draw_random(block, camera, share, style)

@@ -13,7 +13,7 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
     for band in [Band::Level, Band::Oblique, Band::High] {
         let mut groups: Vec<Vec<&Row>> = Vec::new();
         for row in &sweep.rows {
-            let own = ["pack", "bias-1/4", "bias-1"].contains(&row.contender.as_str());
+            let own = ["pack", "triangles", "bias-1/4", "bias-1"].contains(&row.contender.as_str());
             if !own || sweep.views[row.view as usize].band != band {
                 continue;
             }
@@ -25,7 +25,8 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
         rows.extend(groups.iter().filter_map(|g| measure(&Summary::new(g), band, plan)));
     }
     let method = format!(
-        "{} held-out views, parallel, {} samples a pixel at {} px and more below, over linear grey {}",
+        "{}: {} held-out views, parallel, {} samples a pixel at {} px and more below, over linear grey {}",
+        plan.light_name(),
         plan.views,
         plan.sampling.count(),
         plan.heights[0],

@@ -7,7 +7,6 @@ use crate::path::PoppingRow;
 use crate::plan::{BACKGROUND, Plan};
 use crate::ratio::{Metric, Ratio, ratios};
 use crate::sweep::{Row, Sweep};
-use forest_raster::Light;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -98,10 +97,7 @@ impl Evaluation {
     /// Puts a sweep and what it judged together.
     pub fn new(mut subject: Subject, plan: &Plan, contenders: &[Contender], sweep: Sweep) -> Self {
         subject.renderer = "forest-raster, CPU".into();
-        subject.light = match plan.light {
-            Light::Albedo => "albedo".into(),
-            Light::Sun(_) => "sun".into(),
-        };
+        subject.light = plan.light_name().into();
         subject.samples = plan.sampling.count() as u64;
         subject.background = BACKGROUND;
         subject.heights.clone_from(&plan.heights);

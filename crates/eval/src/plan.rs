@@ -51,6 +51,14 @@ impl Plan {
         }
     }
 
+    /// `albedo` or `sun`.
+    pub fn light_name(&self) -> &'static str {
+        match self.light {
+            Light::Albedo => "albedo",
+            Light::Sun(_) => "sun",
+        }
+    }
+
     /// Checks the plan's rules.
     ///
     /// # Errors

@@ -67,7 +67,7 @@ pub use header::{BakeCounts, CellRecord, PointsHeader};
 pub use materials::{read_materials, write_materials};
 pub use options::{BakeOptions, GridChoice, Order, RadiusRule, SurfelSize};
 pub use record::PointRecord;
-pub use select::{CellCut, Cut, PixelArea, Thresholds, select, select_into};
+pub use select::{CellCut, Cut, PixelArea, Thresholds, select, select_into, within_budget};
 pub use size::SizeCode;
 pub use triangle::{TriangleRecord, UvRange, VertexRecord};
 pub use validate::validate;

@@ -42,6 +42,10 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
+    /// All triangles and no point.
+    pub const TRIANGLES: Self =
+        Self { finest: PixelArea(0.0), largest: PixelArea(0.0), depth_bias: PixelArea(0.0) };
+
     /// Those of a level in a pack's measured table ([`forest_pack::measures::Measure::level`]).
     pub fn of_level([finest, largest, depth_bias]: [f32; 3]) -> Self {
         let area = |v: f32| PixelArea(f64::from(v));
@@ -180,6 +184,47 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
             cut.cells.push(CellCut { cell: i, points, triangles, fine, coarse, order });
         }
     }
+}
+
+/// The finest cut of at most `most` points and triangles: all triangles if they are so few, else
+/// thresholds s_m, s_M = `ratio`·s_m without
+/// depth bias, and what they draw. Counts are exact for this camera. `None` if even one point is too
+/// many.
+pub fn within_budget(
+    block: &PointsBlock,
+    camera: &Camera,
+    ratio: f64,
+    most: u64,
+) -> Option<(Thresholds, u64)> {
+    let triangles = block.triangles.len() as u64;
+    if (1..=most).contains(&triangles) {
+        // The source itself: nothing is better.
+        return Some((Thresholds::TRIANGLES, triangles));
+    }
+    let mut cut = Cut::default();
+    let mut count = |log: f64| {
+        let finest = PixelArea(log.exp2());
+        let largest = PixelArea(ratio * finest.0);
+        let thresholds = Thresholds { finest, largest, depth_bias: PixelArea(0.0) };
+        select_into(block, camera, &thresholds, &mut cut);
+        (thresholds, cut.points(block).count() as u64 + cut.triangle_count())
+    };
+    // Bisection between a cut that fits and one that does not, in logarithms of s_m.
+    let (mut low, mut high) = (-40.0, 60.0);
+    let mut best = count(high);
+    if best.1 > most {
+        return None;
+    }
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        let found = count(middle);
+        if found.1 <= most {
+            (high, best) = (middle, found);
+        } else {
+            low = middle;
+        }
+    }
+    Some(best)
 }
 
 fn code(code: Option<SizeCode>) -> i32 {

@@ -113,8 +113,12 @@ impl Measures {
     pub fn merged(&self, newer: &Self) -> Self {
         let key = |r: &Measure| (r.representation, r.light);
         let kept = self.rows.iter().filter(|r| newer.rows.iter().all(|n| key(n) != key(r)));
-        let rows = kept.chain(&newer.rows).copied().collect();
-        Self { method: newer.method.clone(), rows }
+        let rows: Vec<Measure> = kept.chain(&newer.rows).copied().collect();
+        let mut method = newer.method.clone();
+        if rows.len() > newer.rows.len() && self.method != method {
+            method = format!("{}; {method}", self.method);
+        }
+        Self { method, rows }
     }
 
     /// The rows of other representations than this one.
@@ -150,6 +154,12 @@ impl Measures {
     pub fn best_within(&self, need: &Need, limit: f32) -> Option<Choice> {
         let good = self.choices(need).into_iter().filter(|c| c.primitives <= limit);
         good.min_by(|a, b| a.error.total_cmp(&b.error).then(a.primitives.total_cmp(&b.primitives)))
+    }
+
+    /// Least and greatest measured pixel height for a need's representation and light.
+    pub fn heights(&self, need: &Need) -> (f32, f32) {
+        let asked = |r: &&Measure| r.representation == need.representation && r.light == need.light;
+        range(self.rows.iter().filter(asked).map(|r| r.pixel_height))
     }
 
     /// What is known of each level at the needed height: the worst of the elevations that may be
@@ -355,6 +365,7 @@ mod tests {
             Measures { method: "newer".into(), rows: vec![row(2.0, 64.0, [0.0, 9.0], 1.0, 0.1)] };
         let merged = old.merged(&newer);
         assert_eq!(merged.rows, [old.rows[0], old.rows[1], newer.rows[0]]);
+        assert_eq!(merged.method, "made; newer");
         assert_eq!(old.without(kind::POINTS_HEADER).rows, [old.rows[0]]);
     }
 }

@@ -41,6 +41,7 @@ pub(crate) fn count(v: f64) -> String {
 /// A knob for people.
 pub(crate) fn knob(k: crate::Knob) -> String {
     match k {
+        crate::Knob::Points { s_max: 0.0, .. } => "triangles".into(),
         crate::Knob::Points { s_m, k: 0.0, .. } => format!("s_m {} px²", short(s_m)),
         crate::Knob::Points { s_m, k, .. } => format!("s_m {} px², k {}", short(s_m), short(k)),
         crate::Knob::Share(share) => format!("{} %", short(100.0 * share)),

@@ -35,8 +35,9 @@ impl Axis {
 }
 
 /// Distinct for people who see red and green alike (after M. Okabe and K. Ito's set).
-const COLORS: [RGBColor; 10] = [
+const COLORS: [RGBColor; 11] = [
     RGBColor(0, 0, 0),
+    RGBColor(120, 70, 30),
     RGBColor(86, 180, 233),
     RGBColor(170, 68, 255),
     RGBColor(230, 159, 0),

@@ -1,7 +1,7 @@
 //! The table on a terminal.
 
 use super::{count, knob, short};
-use crate::evaluation::Evaluation;
+use crate::evaluation::{Evaluation, Summary};
 use std::fmt::{Error, Write};
 
 /// What the pack costs and how far it is from its source, by height and threshold, and how many
@@ -12,16 +12,21 @@ use std::fmt::{Error, Write};
 pub fn text(e: &Evaluation) -> Result<String, Error> {
     let mut t = String::new();
     let s = &e.subject;
+    let own = |x: &Summary| ["pack", "triangles"].contains(&x.row.contender.as_str());
     writeln!(
         t,
-        "{}: {} points of {} triangles, {}; {} views, {} samples",
+        "{}: {} points of {} triangles, {}; {} light, {} views, {} samples",
         s.pack,
         count(s.points as f64),
         count(s.triangles as f64),
         if s.calibrated { "calibrated" } else { "not calibrated" },
+        s.light,
         e.views.len(),
         s.samples
     )?;
+    if s.light == "sun" {
+        writeln!(t, "the source throws shadows, the levels do not: most of the errors is that")?;
+    }
     writeln!(
         t,
         "\n{:>6}  {:<16} {:>11} {:>9} {:>7} {:>7} {:>6} {:>9} {:>6} {:>8} {:>9}",
@@ -37,7 +42,7 @@ pub fn text(e: &Evaluation) -> Result<String, Error> {
         "depth",
         "render"
     )?;
-    for x in e.summaries().iter().filter(|x| x.row.contender == "pack") {
+    for x in e.summaries().iter().filter(|x| own(x)) {
         let c = &x.errors;
         writeln!(
             t,
@@ -77,15 +82,15 @@ pub fn text(e: &Evaluation) -> Result<String, Error> {
     if !e.popping.is_empty() {
         writeln!(
             t,
-            "\nchange of the picture, RMSE: as the level follows a step of 1 % with the camera still \
-             (a mesh: one switch of level);\nas the camera takes the step, what the truth (changing by {}) \
-             does not do, and with one cut for all steps",
+            "\npopping: RMSE from picture to picture as the camera moves away by 1 %; the truth changes by {}\n\
+             still: only the level follows, the camera stands (a mesh: one switch of level)\n\
+             moving: what changes and the truth does not; one cut: the same without switches of level",
             e.popping.first().map_or("0".into(), |p| short(p.truth))
         )?;
         for p in &e.popping {
             writeln!(
                 t,
-                "{:<11} {:<18} {:>8} (worst {}); {:>7} (worst {}, one cut {})",
+                "{:<11} {:<22} still {:>6} (worst {}), moving {:>6} (worst {}), one cut {}",
                 p.contender,
                 knob(p.knob),
                 short(p.still),

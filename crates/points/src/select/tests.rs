@@ -211,3 +211,23 @@ proptest! {
         prop_assert!((got / whole - 1.0).abs() < 0.05, "{got} {whole}");
     }
 }
+
+#[test]
+fn budgets_hold_and_are_used() {
+    let pack = baked(&leaves(3000, 5), &BakeOptions::default());
+    let block = PointsBlock::open(&pack).unwrap();
+    let camera = camera(6.0, DVec3::Z);
+    let drawn = |t: &Thresholds| {
+        let cut = select(&block, &camera, t);
+        cut.points(&block).count() as u64 + cut.triangle_count()
+    };
+    for most in [1, 17, 500, 2999] {
+        let (thresholds, count) = within_budget(&block, &camera, 16.0, most).unwrap();
+        assert_eq!(count, drawn(&thresholds));
+        assert!(count <= most && (most < 20 || count * 10 > most * 9), "{count} of {most}");
+    }
+    let (thresholds, count) = within_budget(&block, &camera, 16.0, 3000).unwrap();
+    assert_eq!((thresholds, count), (Thresholds::TRIANGLES, 3000));
+    assert_eq!(drawn(&thresholds), 3000);
+    assert_eq!(within_budget(&block, &camera, 16.0, 0), None);
+}
