@@ -225,8 +225,12 @@ fn chosen_levels_keep_their_promise() {
             let (picture, drawn) = draw_points(&block, Some(&surfaces), &camera, &t, &style);
             let error = Comparison::new(&source, &picture).errors(BACKGROUND, 1.0).rmse;
             assert!(choice.error <= within);
-            // A thousandth: what other samples make of edges.
-            assert!(error <= f64::from(choice.error) * 1.15 + 1e-3, "{height}: {error} {choice:?}");
+            if t == Thresholds::TRIANGLES {
+                // Nothing but quantised corners, under other samples than the measured ones.
+                assert!(error <= 1e-3, "{height}: {error} {choice:?}");
+            } else {
+                assert!(error <= f64::from(choice.error) * 1.15, "{height}: {error} {choice:?}");
+            }
             let primitives = drawn.primitives() as f32;
             assert!(primitives <= choice.primitives * 1.15 + 8.0, "{primitives} {choice:?}");
             chosen += 1;

@@ -62,9 +62,6 @@ pub(crate) struct Args {
     alpha: bool,
 }
 
-/// s_M over s_m, if not given.
-const LARGEST_RATIO: f64 = 16.0;
-
 /// A number above zero.
 fn positive(text: &str) -> Result<f32, String> {
     let value: f32 = text.parse().map_err(|_| "not a number".to_string())?;
@@ -113,7 +110,7 @@ impl Args {
         quiet: bool,
     ) -> Result<Vec<Thresholds>> {
         if let Some(most) = self.budget {
-            let found = within_budget(block, camera, LARGEST_RATIO, most);
+            let found = within_budget(block, camera, Thresholds::LARGEST_RATIO, most);
             let (thresholds, _) = found.with_context(|| {
                 format!("{}: no cut has {most} primitives or fewer", self.pack.display())
             })?;
@@ -122,7 +119,7 @@ impl Args {
         let Some(limit) = self.error else {
             let thresholds = |&finest: &f64| Thresholds {
                 finest: PixelArea(finest),
-                largest: PixelArea(self.largest.unwrap_or(LARGEST_RATIO * finest)),
+                largest: PixelArea(self.largest.unwrap_or(Thresholds::LARGEST_RATIO * finest)),
                 depth_bias: PixelArea(self.bias),
             };
             return Ok(self.finest.iter().map(thresholds).collect());

@@ -3,7 +3,7 @@
 use crate::output;
 use crate::source::{PointsOptions, SourceArgs};
 use anyhow::Result;
-use forest_points::{BakeOptions, CutAudit, Order, RadiusRule, audit};
+use forest_points::{BakeOptions, CutAudit, Order, RadiusRule, Thresholds, audit};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -14,7 +14,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     options: PointsOptions,
     /// s_M over s_m: where the paper's range of sizes ends.
-    #[arg(long, default_value_t = 16.0)]
+    #[arg(long, default_value_t = Thresholds::LARGEST_RATIO)]
     ratio: f64,
     /// Print JSON.
     #[arg(long)]

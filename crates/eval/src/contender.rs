@@ -9,9 +9,6 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::time::Instant;
 
-/// s_M over s_m: points larger than that are drawn as triangles.
-pub(crate) const LARGEST_RATIO: f64 = 16.0;
-
 /// One way to draw a tree.
 pub struct Contender<'a> {
     /// A short name.
@@ -114,7 +111,11 @@ impl Contender<'_> {
         match &self.way {
             Way::Points { bias, .. } => s_m
                 .iter()
-                .map(|&s| Knob::Points { s_m: s, s_max: LARGEST_RATIO * s, k: bias * s })
+                .map(|&s| Knob::Points {
+                    s_m: s,
+                    s_max: Thresholds::LARGEST_RATIO * s,
+                    k: bias * s,
+                })
                 .collect(),
             Way::Triangles { .. } => vec![Knob::Points { s_m: 0.0, s_max: 0.0, k: 0.0 }],
             Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),

@@ -17,8 +17,8 @@ pub struct View {
     pub band: Band,
 }
 
-/// Elevation of the lowest view, in degrees: views start at sin(elevation) = −0.1.
-const LOWEST: f32 = -6.0;
+/// Sine of the elevation at which views start: a little below the horizon.
+const LOWEST_SIN: f64 = -0.1;
 
 /// A range of elevations, for tables.
 #[derive(
@@ -38,7 +38,7 @@ impl Band {
     /// Its lowest and highest elevation in degrees.
     pub fn range(self) -> [f32; 2] {
         match self {
-            Self::Level => [LOWEST, 20.0],
+            Self::Level => [LOWEST_SIN.asin().to_degrees().floor() as f32, 20.0],
             Self::Oblique => [20.0, 50.0],
             Self::High => [50.0, 90.0],
         }
@@ -65,7 +65,7 @@ pub fn held_out_views(count: u32) -> Vec<View> {
 pub(crate) fn views_from(count: u32, offset: f64, azimuth: f64) -> Vec<View> {
     (0..count)
         .map(|i| {
-            let sin = -0.1 + 1.1 * (f64::from(i) + offset) / f64::from(count);
+            let sin = LOWEST_SIN + (1.0 - LOWEST_SIN) * (f64::from(i) + offset) / f64::from(count);
             let azimuth = azimuth + f64::from(i) * 2.399_963_229_728_653;
             let flat = (1.0 - sin * sin).sqrt();
             let elevation = sin.asin().to_degrees();

@@ -42,6 +42,9 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
+    /// s_M over s_m where only s_m is given.
+    pub const LARGEST_RATIO: f64 = 16.0;
+
     /// All triangles and no point.
     pub const TRIANGLES: Self =
         Self { finest: PixelArea(0.0), largest: PixelArea(0.0), depth_bias: PixelArea(0.0) };
@@ -56,7 +59,11 @@ impl Thresholds {
 impl Default for Thresholds {
     /// Points of about a pixel, triangles above 16 pixels, no bias.
     fn default() -> Self {
-        Self { finest: PixelArea(1.0), largest: PixelArea(16.0), depth_bias: PixelArea(0.0) }
+        Self {
+            finest: PixelArea(1.0),
+            largest: PixelArea(Self::LARGEST_RATIO),
+            depth_bias: PixelArea(0.0),
+        }
     }
 }
 
