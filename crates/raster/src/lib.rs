@@ -39,6 +39,7 @@
 //! ```
 
 mod canvas;
+mod capture;
 mod light;
 mod list;
 mod mesh;
@@ -50,6 +51,7 @@ mod sampling;
 mod surface;
 
 pub use canvas::{Style, draw};
+pub use capture::{Buffers, Capture, CaptureScene, Skylight, Subject};
 pub use light::{Light, Sun};
 pub use list::{Corner, DisplayList, Ellipse, Projector};
 pub use mesh::rasterize;

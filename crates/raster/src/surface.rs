@@ -70,4 +70,38 @@ impl Surface {
         let coverage = self.material.coverage(alpha, tint[3]);
         (std::array::from_fn(|k| rgb[k] * tint[k]), coverage)
     }
+
+    /// Linear RGB, not premultiplied, of `texels` texels (an area) about `uv`.
+    pub(crate) fn color(&self, uv: Vec2, texels: f32, tint: [f32; 4]) -> [f32; 3] {
+        let [r, g, b, _] = self.material.base_color;
+        let rgb = match &self.texture {
+            Some(texture) => {
+                let [r, g, b, a] = texture.sample_area(uv, texels);
+                let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
+                [r, g, b].map(|v| v * scale)
+            }
+            None => [r, g, b],
+        };
+        std::array::from_fn(|k| rgb[k] * tint[k])
+    }
+
+    /// Texels of its texture; 0 without one.
+    pub(crate) fn texels(&self) -> f32 {
+        self.texture.as_ref().map_or(0.0, ShadedTexture::texels)
+    }
+
+    /// Mean over a triangle of what it shows: linear RGB weighted by alpha, not premultiplied;
+    /// from up to 2^`depth` samples.
+    pub(crate) fn mean(&self, uvs: [Vec2; 3], tint: [f32; 4], depth: u32) -> [f32; 3] {
+        let [r, g, b, _] = self.material.base_color;
+        let rgb = match &self.texture {
+            Some(texture) => {
+                let [r, g, b, a] = texture.integrate(uvs, depth);
+                let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
+                [r, g, b].map(|v| v * scale)
+            }
+            None => [r, g, b],
+        };
+        std::array::from_fn(|k| rgb[k] * tint[k])
+    }
 }

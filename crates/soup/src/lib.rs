@@ -30,6 +30,7 @@
 
 mod camera;
 mod color;
+mod coverage;
 mod material;
 mod model;
 mod placement;
@@ -39,6 +40,7 @@ mod texture;
 
 pub use camera::{Camera, Projection};
 pub use color::{linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
+pub use coverage::CoverageMap;
 pub use material::{AlphaMode, Material};
 pub use model::{FlattenError, Instance, Mesh, Model};
 pub use placement::Placement;

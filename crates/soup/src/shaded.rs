@@ -52,6 +52,22 @@ impl ShadedTexture {
         Self { levels, wrap: texture.wrap, translucent }
     }
 
+    /// Texels of the finest level.
+    pub fn texels(&self) -> f32 {
+        self.levels[0].texels.len() as f32
+    }
+
+    /// The coverage of all levels, in 8 bits.
+    pub(crate) fn coverage_levels(&self) -> Vec<crate::coverage::Level> {
+        let coverage = |t: &[u16; 4]| (f32::from(t[3]) * (255.0 / ONE)).round() as u8;
+        let level = |l: &Level| crate::coverage::Level {
+            width: l.width,
+            height: l.height,
+            texels: l.texels.par_iter().map(coverage).collect(),
+        };
+        self.levels.iter().map(level).collect()
+    }
+
     /// Whether any texel is not fully covered.
     pub fn is_translucent(&self) -> bool {
         self.translucent
@@ -60,6 +76,12 @@ impl ShadedTexture {
     /// Bilinear sample of the finest level: premultiplied linear RGBA in `0..=1`.
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         self.sample_level(0, uv)
+    }
+
+    /// Bilinear sample of the level whose texels are nearest to `texels` of the finest in area.
+    pub fn sample_area(&self, uv: Vec2, texels: f32) -> [f32; 4] {
+        let level = (0.5 * texels.max(1.0).log2()).round() as usize;
+        self.sample_level(level.min(self.levels.len() - 1), uv)
     }
 
     /// Alpha of [`ShadedTexture::sample`], without the rest.
