@@ -22,10 +22,22 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-import", &["forest-soup"]),
     ("forest-points", &["forest-soup", "forest-pack"]),
     ("forest-raster", &["forest-soup"]),
-    ("forest-draw", &["forest-soup", "forest-raster", "forest-pack", "forest-points"]),
+    ("forest-views", &["forest-soup", "forest-raster", "forest-pack"]),
+    ("forest-export", &["forest-soup", "forest-pack", "forest-views"]),
+    (
+        "forest-draw",
+        &["forest-soup", "forest-raster", "forest-pack", "forest-points", "forest-views"],
+    ),
     (
         "forest-eval",
-        &["forest-soup", "forest-raster", "forest-pack", "forest-points", "forest-draw"],
+        &[
+            "forest-soup",
+            "forest-raster",
+            "forest-pack",
+            "forest-points",
+            "forest-views",
+            "forest-draw",
+        ],
     ),
     ("forest-sample-data", &["forest-soup"]),
     (
@@ -38,6 +50,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-raster",
             "forest-draw",
             "forest-eval",
+            "forest-views",
+            "forest-export",
         ],
     ),
     (
@@ -50,6 +64,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-raster",
             "forest-draw",
             "forest-eval",
+            "forest-views",
+            "forest-export",
             "forest-sample-data",
         ],
     ),

@@ -10,4 +10,6 @@ mod ground_truth; // the pictures that packs are judged against: two ways, and a
 mod hard_cases; // degenerate and extreme soups, each with its expected number
 mod invariance; // threads, places and scales that must not matter
 mod real_trees; // trees by others, where they are present
-mod support; // temporary folders, running the program
+mod support;
+mod views;
+mod views_export; // temporary folders, running the program

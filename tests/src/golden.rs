@@ -1,11 +1,12 @@
 //! The golden packs: what they are made of. `make golden` writes them; tests only read them.
 
 use crate::soups::{leaves, texture, textured};
-use crate::{bake_bytes, open};
+use crate::{bake_bytes, bake_views, open};
 use forest_pack::measures::{Light, Measure, Measures};
 use forest_pack::{PackError, PackWriter, kind};
 use forest_points::{BakeOptions, Calibration, GridChoice, Order, RadiusRule, SurfelSize};
 use forest_soup::{AlphaMode, TriangleSoup};
+use forest_views::{Directions, Dome, Quality, ViewsOptions};
 use std::path::PathBuf;
 
 /// One golden pack.
@@ -13,9 +14,15 @@ pub struct Golden {
     /// File name in `tests/golden`.
     pub name: &'static str,
     soup: TriangleSoup,
-    options: BakeOptions,
-    /// With a calibration and a measured table, both made up.
-    measured: bool,
+    content: Content,
+}
+
+/// What a golden pack holds.
+enum Content {
+    /// Points; `measured` ones with a calibration and a measured table, both made up.
+    Points { options: BakeOptions, measured: bool },
+    /// Views, and nothing else.
+    Views(ViewsOptions),
 }
 
 /// No golden pack is larger.
@@ -32,8 +39,15 @@ impl Golden {
     /// # Panics
     /// When it cannot be baked: that is a bug.
     pub fn bake(&self) -> Vec<u8> {
-        let bytes = bake_bytes(&self.soup, &self.options).expect("a golden soup bakes").0;
-        if self.measured { with_measures(&bytes).expect("a golden pack") } else { bytes }
+        match &self.content {
+            Content::Points { options, measured } => {
+                let bytes = bake_bytes(&self.soup, options).expect("a golden soup bakes").0;
+                if *measured { with_measures(&bytes).expect("a golden pack") } else { bytes }
+            }
+            Content::Views(options) => {
+                bake_views(&self.soup, options).expect("a golden soup bakes")
+            }
+        }
     }
 }
 
@@ -91,36 +105,35 @@ pub fn all() -> Vec<Golden> {
         grid: GridChoice::Budget(8),
         ..BakeOptions::default()
     };
+    let points = |name, soup, options| Golden {
+        name,
+        soup,
+        content: Content::Points { options, measured: false },
+    };
+    let paper =
+        BakeOptions { radius: RadiusRule::Paper, order: Order::Paper, triangles: false, ..cut };
+    let single = BakeOptions { surfel_size: SurfelSize::Triangle, ..cut };
+    // Without blocks, whose encoder may round otherwise on another processor.
+    let views = ViewsOptions {
+        directions: Directions::octahedral(9, Dome::Upper),
+        texels: 16,
+        quality: Quality::Lossless,
+        ..ViewsOptions::default()
+    };
     vec![
+        points("textured.fpack", textured(leaves(150, 0.2, 1), leaf.clone(), mask), cut),
+        points("vertex-colours.fpack", colored.clone(), cut),
+        points("paper.fpack", leaves(300, 0.1, 3), paper),
+        points("one-triangle.fpack", leaves(1, 0.5, 4), single),
         Golden {
-            name: "textured.fpack",
-            soup: textured(leaves(150, 0.2, 1), leaf, mask),
-            options: cut,
-            measured: false,
+            name: "views.fpack",
+            soup: textured(leaves(60, 0.3, 5), leaf, mask),
+            content: Content::Views(views),
         },
         Golden {
-            name: "vertex-colours.fpack",
-            soup: colored.clone(),
-            options: cut,
-            measured: false,
+            name: "measured.fpack",
+            soup: colored,
+            content: Content::Points { options: cut, measured: true },
         },
-        Golden {
-            name: "paper.fpack",
-            soup: leaves(300, 0.1, 3),
-            options: BakeOptions {
-                radius: RadiusRule::Paper,
-                order: Order::Paper,
-                triangles: false,
-                ..cut
-            },
-            measured: false,
-        },
-        Golden {
-            name: "one-triangle.fpack",
-            soup: leaves(1, 0.5, 4),
-            options: BakeOptions { surfel_size: SurfelSize::Triangle, ..cut },
-            measured: false,
-        },
-        Golden { name: "measured.fpack", soup: colored, options: cut, measured: true },
     ]
 }

@@ -4,15 +4,16 @@ pub mod golden;
 pub mod reference;
 pub mod soups;
 
-use forest_draw::{draw_points, read_surfaces};
+use forest_draw::{ViewsLevel, draw_points, read_surfaces};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{ErrorKind, Light, Measures, Need};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::{
     BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, select,
 };
-use forest_raster::{Sampling, Style};
+use forest_raster::{CaptureScene, Sampling, Style, Surfaces};
 use forest_soup::{Camera, Projection, TriangleSoup};
+use forest_views::{Frame, Lookup, ViewsBlock, ViewsError, ViewsOptions};
 use glam::DVec3;
 use std::path::Path;
 
@@ -32,6 +33,28 @@ pub fn bake_bytes(
     let report = bake(soup, options, &mut writer, &|_| {})?;
     writer.finish()?;
     Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+}
+
+/// Bakes views into memory; the pack has a fixed `meta` section.
+///
+/// # Errors
+/// As [`forest_views::bake()`].
+pub fn bake_views(soup: &TriangleSoup, options: &ViewsOptions) -> Result<Vec<u8>, ViewsError> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    let meta = Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] };
+    header::write(&mut writer, SectionId::new(kind::META, 0), &meta)?;
+    let frame =
+        Frame::of(soup, &options.directions, options.fit).ok_or(ViewsError::NothingToSee)?;
+    let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+    let mut scene = CaptureScene::new(soup, &surfaces);
+    if options.channels.sky {
+        scene = scene.with_skylight();
+    }
+    forest_views::bake(&scene, &frame, options, &mut writer, &|_| {})?;
+    writer.finish()?;
+    Ok(std::fs::read(&path).expect("the pack that was just written"))
 }
 
 /// Opens a pack in memory.
@@ -61,10 +84,14 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         };
         table.cheapest(&need, 0.1).or(table.best_within(&need, 1e3));
     }
+    let drawn = if ViewsBlock::is_in(&pack) { use_views(&pack)? } else { 0 };
+    if drawn > 0 && !PointsBlock::is_in(&pack) {
+        return Ok(drawn);
+    }
     let block = PointsBlock::open(&pack)?;
     let surfaces = read_surfaces(&pack, &block)?;
     let projection = Projection::Perspective { fov_y: 1.0 };
-    let mut drawn = 0;
+    let mut drawn = drawn;
     for distance in [0.0, 1.0, 1e4] {
         let eye = block.origin() + DVec3::Z * (distance * block.scale());
         let camera = Camera::new(eye, -DVec3::Z, projection, [640, 480]);
@@ -74,6 +101,28 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         let small = Camera { width: 16, height: 16, ..camera };
         let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
         draw_points(&block, surfaces.as_ref(), &small, &thresholds, &style);
+    }
+    Ok(drawn)
+}
+
+/// Decodes every level of the views and draws it, from afar and from within.
+fn use_views(pack: &Pack) -> Result<usize, PackError> {
+    let block = ViewsBlock::open(pack)?;
+    let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
+    let mut drawn = 0;
+    for level in 0..block.header.levels.len() {
+        let views = ViewsLevel::read(&block, level)?;
+        for (projection, distance) in [
+            (Projection::Perspective { fov_y: 1.0 }, 0.0),
+            (Projection::Orthographic { height: 2.0 * block.header.half }, 4.0),
+        ] {
+            let from = DVec3::new(0.3, 0.2, 1.0).normalize();
+            let eye = block.center() + from * (distance * block.header.radius);
+            let camera = Camera::new(eye, -from, projection, [8, 8]);
+            for lookup in Lookup::ALL {
+                drawn += views.draw(&camera, lookup, &style).1.views as usize;
+            }
+        }
     }
     Ok(drawn)
 }

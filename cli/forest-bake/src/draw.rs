@@ -4,12 +4,13 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use anyhow::{Context, Result, bail};
-use forest_draw::{draw_points, read_surfaces};
+use forest_draw::{ViewsLevel, draw_points, read_surfaces};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
 use forest_raster::{Picture, Sampling, Style};
 use forest_soup::{Camera, Projection};
+use forest_views::{Lookup, ViewsBlock, select};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
 use std::io::Cursor;
@@ -51,6 +52,15 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     #[arg(conflicts_with_all = ["finest", "largest", "bias"])]
     budget: Option<u64>,
+    /// Draw this representation; default: points, if the pack has them.
+    #[arg(long = "as", value_enum, value_name = "WHAT")]
+    what: Option<Representation>,
+    /// How views are looked up; several give pictures side by side.
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "depth")]
+    lookup: Vec<LookupArg>,
+    /// Largest width of a view's texel in pixels: what chooses the level of views.
+    #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive_wide)]
+    texel: f64,
     /// Light, without shadows.
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
@@ -60,6 +70,39 @@ pub(crate) struct Args {
     /// Straight alpha instead of a grey background.
     #[arg(long)]
     alpha: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Representation {
+    /// Points, and triangles near the camera.
+    Points,
+    /// Views.
+    Views,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum LookupArg {
+    /// The nearest view.
+    Nearest,
+    /// The three views around, by their shares.
+    Blend,
+    /// The three views around, followed through their depth.
+    Depth,
+}
+
+impl From<LookupArg> for Lookup {
+    fn from(l: LookupArg) -> Self {
+        match l {
+            LookupArg::Nearest => Self::Nearest,
+            LookupArg::Blend => Self::Blend,
+            LookupArg::Depth => Self::Depth,
+        }
+    }
+}
+
+/// A number above zero.
+fn positive_wide(text: &str) -> Result<f64, String> {
+    positive(text).map(f64::from)
 }
 
 /// A number above zero.
@@ -78,14 +121,28 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         );
     }
     let pack = Pack::open(&args.pack)?;
-    let block = PointsBlock::open(&pack)?;
-    let surfaces = read_surfaces(&pack, &block)?;
-    let camera = args.camera(&block)?;
     let style =
         Style { sampling: Sampling { side: args.samples, seed: 1 }, light: args.light.light() };
+    let what = args.what.unwrap_or(if PointsBlock::is_in(&pack) || !ViewsBlock::is_in(&pack) {
+        Representation::Points
+    } else {
+        Representation::Views
+    });
+    let pictures = match what {
+        Representation::Points => draw_all_points(args, &pack, &style, quiet)?,
+        Representation::Views => draw_all_views(args, &pack, &style, quiet)?,
+    };
+    write(args, &pictures)
+}
+
+fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+    let block = PointsBlock::open(pack)?;
+    let surfaces = read_surfaces(pack, &block)?;
+    let [min, max] = [block.header.min, block.header.max].map(|v| block.to_world(v.into()));
+    let camera = args.camera([min, max])?;
     let mut pictures = Vec::new();
-    for thresholds in args.levels(&pack, &block, &camera, quiet)? {
-        let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, &style);
+    for thresholds in args.levels(pack, &block, &camera, quiet)? {
+        let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, style);
         if !quiet {
             eprintln!(
                 "s_m {} px²: {} points, {} triangles, coverage {:.4}",
@@ -97,7 +154,35 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         }
         pictures.push(picture);
     }
-    write(args, &pictures)
+    Ok(pictures)
+}
+
+fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+    if args.error.is_some() || args.budget.is_some() {
+        bail!(Usage("--error and --budget choose levels of points; --texel those of views".into()));
+    }
+    let block = ViewsBlock::open(pack)?;
+    let bounds = block.header.bounds.map(|b| block.center() + DVec3::from_array(b));
+    let camera = args.camera(bounds)?;
+    let mut pictures = Vec::new();
+    for lookup in args.lookup.iter().map(|&l| Lookup::from(l)) {
+        let chosen = select(&block, &camera, lookup, args.texel);
+        let level = ViewsLevel::read(&block, chosen.level)?;
+        let (picture, drawn) = level.draw(&camera, lookup, style);
+        if !quiet {
+            eprintln!(
+                "{}: {} of {} views of {}² texels, {}, coverage {:.4}",
+                lookup.name(),
+                drawn.views,
+                block.directions().count(),
+                level.side(),
+                output::bytes(drawn.bytes),
+                picture.mean_coverage()
+            );
+        }
+        pictures.push(picture);
+    }
+    Ok(pictures)
 }
 
 impl Args {
@@ -154,7 +239,8 @@ impl Args {
         Ok(vec![Thresholds::of_level(choice.level)])
     }
 
-    fn camera(&self, block: &PointsBlock) -> Result<Camera> {
+    /// A camera on the box from `min` to `max`.
+    fn camera(&self, [min, max]: [DVec3; 2]) -> Result<Camera> {
         let [yaw, pitch] = match self.view.as_str() {
             "front" => [0.0, 0.0],
             "right" => [90.0, 0.0],
@@ -171,13 +257,11 @@ impl Args {
         };
         let (yaw, pitch) = (f64::to_radians(yaw), f64::to_radians(pitch));
         let from = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos());
-        let radius = block.half_diagonal();
-        let [min, max] = [block.header.min, block.header.max].map(DVec3::from_array);
-        let center = block.to_world((min + max) * 0.5);
+        let (center, radius) = ((min + max) * 0.5, (max - min).length() * 0.5);
         let size = [self.size; 2];
         let corners: [DVec3; 8] = std::array::from_fn(|i| {
             let pick = |k: usize| if i >> k & 1 == 0 { min[k] } else { max[k] };
-            block.to_world(DVec3::new(pick(0), pick(1), pick(2)))
+            DVec3::new(pick(0), pick(1), pick(2)) - center
         });
         Ok(match self.distance {
             None => {

@@ -4,19 +4,20 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource};
-use anyhow::{Context, Result};
-use forest_draw::read_surfaces;
+use anyhow::{Context, Result, bail};
+use forest_draw::{ViewsLevel, read_surfaces};
 use forest_eval::report::{self, Axis};
 use forest_eval::{
     Baselines, Contender, Evaluation, Metric, Plan, Subject, Sweep, Truth, calibrate, machine,
-    measures, own_contenders, pictures, sweep,
+    measures, own_contenders, pictures, sweep, views_contenders,
 };
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
-use forest_pack::{Pack, PackWriter, SectionId, kind};
+use forest_pack::{Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::{Calibration, PointsBlock};
 use forest_raster::{Sampling, Style, Surfaces};
 use forest_soup::TriangleSoup;
+use forest_views::ViewsBlock;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -86,26 +87,35 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let pack = Pack::open(path)?;
     let source = args.import.load(&args.source, quiet)?;
     refuse_other_source(&pack, &source)?;
-    let block = PointsBlock::open(&pack)?;
+    let points = if PointsBlock::is_in(&pack) { Some(PointsBlock::open(&pack)?) } else { None };
+    let views = if ViewsBlock::is_in(&pack) { Some(ViewsBlock::open(&pack)?) } else { None };
+    if points.is_none() && views.is_none() {
+        bail!("{}: has neither points nor views", path.display());
+    }
     let judge = Judge::new(&source.soup, &plan, quiet);
     let truth = judge.truth()?;
-    let pack_surfaces = read_surfaces(&pack, &block)?;
-    let baselines = if args.alone { None } else { Some(Baselines::new(&source.soup, &block)?) };
+    let pack_surfaces = points.as_ref().map(|block| read_surfaces(&pack, block)).transpose()?;
+    let pack_surfaces = pack_surfaces.flatten();
+    let others = points.as_ref().filter(|_| !args.alone);
+    let baselines = others.map(|block| Baselines::new(&source.soup, block)).transpose()?;
     let blocks = baselines.as_ref().map(Baselines::blocks).transpose()?;
-    let raw = Baselines::raw(&block);
-    let contenders = match (&baselines, &blocks) {
-        (Some(b), Some(blocks)) => {
-            b.contenders(&block, raw.as_ref(), pack_surfaces.as_ref(), blocks)
+    let raw = points.as_ref().and_then(Baselines::raw);
+    let mut contenders = match (&points, &baselines, &blocks) {
+        (Some(points), Some(b), Some(blocks)) => {
+            b.contenders(points, raw.as_ref(), pack_surfaces.as_ref(), blocks)
         }
-        _ => own_contenders(&block, pack_surfaces.as_ref()),
+        (Some(points), ..) => own_contenders(points, pack_surfaces.as_ref()),
+        (None, ..) => vec![],
     };
+    let levels = views.as_ref().map(|v| all_levels(v)).transpose()?.unwrap_or_default();
+    contenders.extend(views_contenders(&levels));
     let found = judge.sweep(&truth, &contenders)?;
     let exhibits = match args.html {
         Some(_) => report::gallery(&truth, &contenders, &plan, &found)?,
         None => vec![],
     };
     let table = args.embed.then(|| measures(&found, &plan));
-    let subject = subject(path, &pack, &block, &source, start.elapsed().as_secs_f64());
+    let subject = subject(path, &pack, points.as_ref(), &source, start.elapsed().as_secs_f64());
     let evaluation = Evaluation::new(subject, &plan, &contenders, found);
     let text = if args.json {
         serde_json::to_string_pretty(&evaluation)? + "\n"
@@ -137,6 +147,11 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// All levels of a pack's views, decoded.
+fn all_levels<'a>(views: &'a ViewsBlock<'a>) -> Result<Vec<ViewsLevel<'a>>, PackError> {
+    (0..views.header.levels.len()).map(|level| ViewsLevel::read(views, level)).collect()
 }
 
 impl Args {
@@ -250,7 +265,7 @@ fn refuse_other_source(pack: &Pack, source: &LoadedSource) -> Result<()> {
 fn subject(
     path: &Path,
     pack: &Pack,
-    block: &PointsBlock,
+    points: Option<&PointsBlock>,
     source: &LoadedSource,
     seconds: f64,
 ) -> Subject {
@@ -265,10 +280,10 @@ fn subject(
         command: std::env::args_os().map(plain).collect::<Vec<_>>().join(" "),
         pack: name(path),
         pack_bytes: pack.file_length(),
-        calibrated: block.calibration.is_some(),
+        calibrated: points.is_some_and(|b| b.calibration.is_some()),
         source: source.meta.sources.iter().map(|s| s.name.clone()).collect(),
         triangles: source.soup.triangles.len() as u64,
-        points: block.points.len() as u64,
+        points: points.map_or(0, |b| b.points.len() as u64),
         machine: machine(),
         threads: rayon::current_num_threads() as u64,
         seconds,

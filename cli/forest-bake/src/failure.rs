@@ -1,10 +1,12 @@
 //! Errors to exit codes.
 
 use forest_eval::EvalError;
+use forest_export::ExportError;
 use forest_import::ImportError;
 use forest_pack::PackError;
 use forest_points::BakeError;
 use forest_soup::FlattenError;
+use forest_views::ViewsError;
 use std::process::ExitCode;
 
 /// Wrong usage.
@@ -46,6 +48,21 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
     }
     if let Some(e) = cause.downcast_ref::<BakeError>() {
         return Some(bake(e));
+    }
+    if let Some(e) = cause.downcast_ref::<ViewsError>() {
+        return Some(match e {
+            ViewsError::Options(_) => 1,
+            ViewsError::Pack(e) => pack(e),
+            ViewsError::Soup(_) | ViewsError::NothingToSee => 3,
+            _ => 4,
+        });
+    }
+    if let Some(e) = cause.downcast_ref::<ExportError>() {
+        return Some(match e {
+            ExportError::Pack(e) => pack(e),
+            ExportError::Unsuited(_) => 5,
+            _ => 4,
+        });
     }
     if let Some(e) = cause.downcast_ref::<EvalError>() {
         return Some(match e {

@@ -6,6 +6,7 @@ use forest_pack::header::{self, Meta};
 use forest_pack::measures::{Measure, Measures};
 use forest_pack::{Codec, Pack, SectionId, kind};
 use forest_points::{BakeCounts, PointsBlock};
+use forest_views::{Channel, Dome, Layout, LevelHeader, Lookup, Quality, ViewsBlock};
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ struct Report {
     sources: Vec<SourceReport>,
     sections: Vec<SectionReport>,
     points: Option<PointsReport>,
+    views: Option<ViewsReport>,
     measures: Option<Measures>,
 }
 
@@ -72,6 +74,85 @@ struct PointsReport {
     calibrated: bool,
     /// Radii of the finest and the coarsest point.
     radius_range: [f64; 2],
+}
+
+/// Lengths are world units.
+#[derive(Serialize)]
+struct ViewsReport {
+    /// Number of views.
+    count: u32,
+    /// How they are spread.
+    layout: String,
+    /// Whether there are views from below the horizon.
+    full_sphere: bool,
+    center: [f64; 3],
+    /// Width of a tile.
+    tile_width: f64,
+    samples_a_texel: u32,
+    quality: String,
+    channels: Vec<&'static str>,
+    levels: Vec<ViewsLevelReport>,
+}
+
+#[derive(Serialize)]
+struct ViewsLevelReport {
+    /// Texels along the side of a tile.
+    texels: u32,
+    page: [u32; 2],
+    pages: u32,
+    /// Stored bytes of all channels.
+    bytes: u64,
+}
+
+impl ViewsReport {
+    fn of(block: &ViewsBlock) -> Self {
+        let h = &block.header;
+        let stored = || Channel::ALL.into_iter().filter(|c| h.channels.has(*c));
+        let level = |(i, l): (usize, &LevelHeader)| ViewsLevelReport {
+            texels: l.texels,
+            page: l.page,
+            pages: l.pages,
+            bytes: stored().map(|c| block.channel_bytes(c, i)).sum(),
+        };
+        let name = |c| match c {
+            Channel::Color => "color",
+            Channel::Normal => "normal",
+            Channel::Depth => "depth",
+            Channel::Sky => "ao",
+        };
+        Self {
+            count: h.directions.count(),
+            layout: match h.directions.layout {
+                Layout::Octahedral { side } => format!("octahedral {side}×{side}"),
+                Layout::Rings { rings, points } => format!("{rings} rings of {points}, and poles"),
+            },
+            full_sphere: h.directions.dome == Dome::Full,
+            center: h.center,
+            tile_width: 2.0 * h.half,
+            samples_a_texel: h.samples,
+            quality: match h.quality {
+                Quality::Lossless => "lossless".into(),
+                Quality::Block => "BC7, BC5, BC4".into(),
+            },
+            channels: stored().map(name).collect(),
+            levels: h.levels.iter().enumerate().map(level).collect(),
+        }
+    }
+
+    fn text(&self, t: &mut String) -> std::fmt::Result {
+        let dome = if self.full_sphere { "all around" } else { "from the horizon up" };
+        writeln!(t, "views")?;
+        writeln!(t, "  directions          {}, {}, {dome}", self.count, self.layout)?;
+        writeln!(t, "  tiles               {:.3} wide about {:.3?}", self.tile_width, self.center)?;
+        writeln!(t, "  samples a texel     {}", self.samples_a_texel)?;
+        writeln!(t, "  channels            {}, {}", self.channels.join(", "), self.quality)?;
+        for l in &self.levels {
+            let [w, h] = l.page;
+            let size = output::bytes(l.bytes);
+            writeln!(t, "  {:>4}² texels        {} page(s) of {w}×{h}, {size}", l.texels, l.pages)?;
+        }
+        Ok(())
+    }
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -119,6 +200,11 @@ impl Report {
             sources,
             sections,
             points,
+            views: if ViewsBlock::is_in(pack) {
+                Some(ViewsReport::of(&ViewsBlock::open(pack)?))
+            } else {
+                None
+            },
             measures: Measures::read(pack)?,
         })
     }
@@ -139,6 +225,9 @@ impl Report {
         }
         if let Some(p) = &self.points {
             p.text(&mut t)?;
+        }
+        if let Some(v) = &self.views {
+            v.text(&mut t)?;
         }
         if let Some(m) = &self.measures {
             measures_text(m, &mut t)?;
@@ -163,27 +252,35 @@ fn measures_text(m: &Measures, t: &mut String) -> std::fmt::Result {
     writeln!(t, "measured: {}", m.method)?;
     writeln!(
         t,
-        "  {:>6} {:>6} {:>10} {:>8} {:>11} {:>8} {:>8} {:>9}",
-        "light", "height", "s_m, px²", "k, px²", "primitives", "FLIP max", "RMSE max", "coverage"
+        "  {:>6} {:>6} {:>13} {:>8} {:>11} {:>8} {:>8} {:>9}",
+        "light", "height", "level", "k, px²", "primitives", "FLIP max", "RMSE max", "coverage"
     )?;
     let mut lines: BTreeMap<_, Vec<&Measure>> = BTreeMap::new();
-    for r in m.rows.iter().filter(|r| r.representation == kind::POINTS_HEADER) {
+    for r in &m.rows {
         // Positive floats sort as their bits do; tall pictures first.
         let height = Reverse(r.pixel_height.to_bits());
-        let key = (r.light as u8, height, r.level.map(f32::to_bits));
+        let key = (r.representation, r.light as u8, height, r.level.map(f32::to_bits));
         lines.entry(key).or_default().push(r);
     }
     for same in lines.values() {
+        let [first, second, third] = same[0].level;
+        let (level, bias) = match same[0].representation {
+            kind::VIEWS_HEADER => {
+                let lookup = Lookup::ALL.get(second as usize).map_or("?", |l| l.name());
+                (format!("{first}² {lookup}"), String::new())
+            }
+            _ => (format!("s_m {first}"), third.to_string()),
+        };
         let mean =
             |of: fn(&Measure) -> f32| same.iter().map(|r| of(r)).sum::<f32>() / same.len() as f32;
         let worst = |of: fn(&Measure) -> f32| same.iter().map(|r| of(r)).fold(0.0, f32::max);
         writeln!(
             t,
-            "  {:>6} {:>6} {:>10} {:>8} {:>11} {:>8.4} {:>8.4} {:>8.1}%",
+            "  {:>6} {:>6} {:>13} {:>8} {:>11} {:>8.4} {:>8.4} {:>8.1}%",
             format!("{:?}", same[0].light).to_lowercase(),
             same[0].pixel_height,
-            same[0].level[0],
-            same[0].level[2],
+            level,
+            bias,
             output::count(mean(|r| r.primitives) as u64),
             worst(|r| r.flip_worst),
             worst(|r| r.rmse_worst),

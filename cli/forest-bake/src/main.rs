@@ -2,6 +2,7 @@
 
 mod draw;
 mod eval;
+mod export;
 mod failure;
 mod inspect;
 mod levels;
@@ -9,7 +10,9 @@ mod light;
 mod output;
 mod points;
 mod source;
+mod target;
 mod verify;
+mod views;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,6 +38,10 @@ struct Args {
 enum Command {
     /// Bake clustered, size-sorted points.
     Points(points::Args),
+    /// Bake views: pictures from many directions, in an atlas.
+    Views(views::Args),
+    /// Write views as textures for engines: PNG, EXR, KTX2.
+    Export(export::Args),
     /// Draw a picture of a pack, at one or several levels of detail.
     Draw(draw::Args),
     /// Judge a pack against its source: error by cost, view and distance, beside other ways.
@@ -73,6 +80,8 @@ fn run(args: Args) -> anyhow::Result<()> {
     let quiet = args.quiet;
     match args.command {
         Command::Points(a) => points::run(&a, quiet),
+        Command::Views(a) => views::run(&a, quiet),
+        Command::Export(a) => export::run(&a, quiet),
         Command::Draw(a) => draw::run(&a, quiet),
         Command::Eval(a) => eval::run(&a, quiet),
         Command::Inspect(a) => inspect::run(&a),

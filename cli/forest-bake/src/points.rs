@@ -1,11 +1,10 @@
 //! `forest-bake points`.
 
-use crate::failure::Usage;
 use crate::output;
 use crate::source::{LoadedSource, PointsOptions, SourceArgs};
+use crate::target;
 use anyhow::Result;
-use forest_pack::header::{self, Meta};
-use forest_pack::measures::Measures;
+use forest_pack::header;
 use forest_pack::{Pack, PackWriter, SectionId, kind};
 use forest_points::{BakeOptions, BakeReport, Order, RadiusRule, bake};
 use serde::Serialize;
@@ -63,7 +62,7 @@ enum Sorting {
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let start = Instant::now();
     let source = args.source.load(quiet)?;
-    let kept = existing(args, &source.meta)?;
+    let kept = target::existing(&args.output, &source.meta, args.force)?;
     let options = args.bake_options(source.trees)?;
     let measured = |p: &Pack| p.contains(SectionId::new(kind::POINTS_CALIBRATION, 0));
     if kept.as_ref().is_some_and(measured) && !args.measure && !quiet {
@@ -82,14 +81,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let report = bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
     bar.finish_and_clear();
     if let Some(pack) = &kept {
-        for (id, _) in pack.sections().filter(|(id, _)| is_foreign(id.kind, &options)) {
-            writer.copy(pack, id)?;
-        }
-        // What was measured of the old points says nothing about the new ones.
-        let others = Measures::read(pack)?.map(|m| m.without(kind::POINTS_HEADER));
-        if let Some(others) = others.filter(|m| !m.rows.is_empty()) {
-            others.write(&mut writer)?;
-        }
+        target::keep_others(&mut writer, pack, kind::POINTS_HEADER, |k| is_own(k, &options))?;
     }
     writer.finish()?;
     if args.measure {
@@ -123,36 +115,12 @@ impl Args {
     }
 }
 
-/// The pack that is there already, if its other representations may be kept.
-fn existing(args: &Args, meta: &Meta) -> Result<Option<Pack>> {
-    if !args.output.exists() {
-        return Ok(None);
-    }
-    let refuse = |why: String| {
-        Usage(format!("{}: {why}; give --force to replace it", args.output.display()))
-    };
-    let pack = match Pack::open(&args.output) {
-        Ok(pack) => pack,
-        Err(_) if args.force => return Ok(None),
-        Err(e) => return Err(refuse(format!("exists and is not a sound pack ({e})")).into()),
-    };
-    let known = header::decode::<Meta>(&pack, SectionId::new(kind::META, 0));
-    let same = known.is_ok_and(|m| m.source_hash == meta.source_hash);
-    match (same, pack.unknown_sections().is_empty()) {
-        (true, true) => Ok(Some(pack)),
-        _ if args.force => Ok(None),
-        (false, _) => Err(refuse("is a pack of another source".into()).into()),
-        (true, false) => Err(refuse("has sections that this version cannot keep".into()).into()),
-    }
-}
-
-/// Whether a section belongs to another representation.
-fn is_foreign(kind: u16, options: &BakeOptions) -> bool {
+/// Whether a section is written by a bake of points.
+fn is_own(kind: u16, options: &BakeOptions) -> bool {
     match kind {
-        kind::META | kind::MEASURES => false,
-        kind::POINTS_HEADER..=kind::POINTS_CALIBRATION => false,
-        kind::MATERIALS | kind::TEXTURE => !options.triangles,
-        _ => true,
+        kind::POINTS_HEADER..=kind::POINTS_CALIBRATION => true,
+        kind::MATERIALS | kind::TEXTURE => options.triangles,
+        _ => false,
     }
 }
 

@@ -6,6 +6,7 @@ use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, SectionId, kind};
 use forest_points::{PointsBlock, read_materials};
+use forest_views::ViewsBlock;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -35,6 +36,9 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
     Measures::read(&pack)?;
+    if ViewsBlock::is_in(&pack) {
+        ViewsBlock::open(&pack)?;
+    }
     if !PointsBlock::is_in(&pack) {
         return Ok(());
     }

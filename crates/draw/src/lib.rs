@@ -34,5 +34,7 @@
 //! ```
 
 mod points;
+mod views;
 
 pub use points::{Drawn, PointsFrame, draw_points, point_ellipses, read_surfaces};
+pub use views::{ViewsDrawn, ViewsLevel};

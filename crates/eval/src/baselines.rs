@@ -2,10 +2,12 @@
 
 use crate::contender::{Contender, Look, Way};
 use crate::error::EvalError;
+use forest_draw::ViewsLevel;
 use forest_pack::{Pack, PackWriter};
 use forest_points::{BakeOptions, GridChoice, Order, PointsBlock, RadiusRule, SurfelSize, bake};
 use forest_raster::Surfaces;
 use forest_soup::TriangleSoup;
+use forest_views::Lookup;
 use std::borrow::Cow;
 
 /// Packs and meshes that contenders draw.
@@ -156,6 +158,23 @@ pub fn own_contenders<'a>(
         own.push(Contender { name: "triangles", what: "the pack's triangles, no points", way });
     }
     own
+}
+
+/// The pack's views, looked up in every way that its channels allow; `levels` finest first.
+pub fn views_contenders<'a>(levels: &'a [ViewsLevel<'a>]) -> Vec<Contender<'a>> {
+    let Some(first) = levels.first() else { return vec![] };
+    let deep = first.block().header.channels.depth;
+    let named = |lookup| match lookup {
+        Lookup::Nearest => ("views", "the view whose direction is nearest"),
+        Lookup::Blend => ("views-blend", "the three views around, by their shares"),
+        Lookup::Depth => ("views-depth", "the three views around, followed through their depth"),
+    };
+    let ways = Lookup::ALL.into_iter().filter(|l| *l != Lookup::Depth || deep);
+    ways.map(|lookup| {
+        let (name, what) = named(lookup);
+        Contender { name, what, way: Way::Views { levels, lookup } }
+    })
+    .collect()
 }
 
 fn baked(soup: &TriangleSoup, options: &BakeOptions) -> Result<Pack, EvalError> {

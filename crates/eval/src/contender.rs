@@ -1,9 +1,10 @@
 //! What is judged: the pack, and other ways to draw the same tree with fewer primitives.
 
-use forest_draw::point_ellipses;
+use forest_draw::{ViewsLevel, point_ellipses};
 use forest_points::{Cut, PixelArea, PointsBlock, Thresholds, select_into};
 use forest_raster::{DisplayList, Ellipse, Picture, Style, Surfaces, draw, rasterize};
 use forest_soup::{Camera, TriangleSoup};
+use forest_views::Lookup;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -31,6 +32,8 @@ pub(crate) enum Way<'a> {
     Triangles { block: &'a PointsBlock<'a>, surfaces: &'a Surfaces },
     /// A random part of the finest points, enlarged to keep their area.
     RandomPoints { block: &'a PointsBlock<'a> },
+    /// Views, level by level, looked up in one way.
+    Views { levels: &'a [ViewsLevel<'a>], lookup: Lookup },
     /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
     Meshes { levels: &'a [(f64, Cow<'a, TriangleSoup>)], surfaces: &'a Surfaces },
 }
@@ -59,6 +62,35 @@ pub enum Knob {
     },
     /// Share of the primitives that is asked for.
     Share(f64),
+    /// A level of views.
+    Views {
+        /// Texels along the side of a whole tile.
+        texels: u32,
+        /// How views are looked up.
+        lookup: ViewsLookup,
+    },
+}
+
+/// How a picture is made of views: [`forest_views::Lookup`], as reports name it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ViewsLookup {
+    /// The nearest view.
+    Nearest,
+    /// Three views, by their shares.
+    Blend,
+    /// Three views, through their depth.
+    Depth,
+}
+
+impl From<Lookup> for ViewsLookup {
+    fn from(lookup: Lookup) -> Self {
+        match lookup {
+            Lookup::Nearest => Self::Nearest,
+            Lookup::Blend => Self::Blend,
+            Lookup::Depth => Self::Depth,
+        }
+    }
 }
 
 impl Knob {
@@ -70,11 +102,11 @@ impl Knob {
                 let area = factor * factor;
                 Knob::Points { s_m: s_m * area, s_max: s_max * area, k: k * area }
             }
-            Knob::Share(share) => Knob::Share(share),
+            other => other,
         }
     }
 
-    /// As `select` wants it; `None` for a share.
+    /// As `select` of points wants it; `None` for others.
     pub fn thresholds(&self) -> Option<Thresholds> {
         match *self {
             Knob::Points { s_m, s_max, k } => Some(Thresholds {
@@ -82,7 +114,7 @@ impl Knob {
                 largest: PixelArea(s_max),
                 depth_bias: PixelArea(k),
             }),
-            Knob::Share(_) => None,
+            Knob::Share(_) | Knob::Views { .. } => None,
         }
     }
 }
@@ -90,7 +122,7 @@ impl Knob {
 /// What a picture cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Cost {
-    /// Points and triangles drawn.
+    /// Points, triangles and views drawn.
     pub primitives: f64,
     /// Bytes of records that a renderer looks at to draw them.
     pub bytes: f64,
@@ -118,6 +150,10 @@ impl Contender<'_> {
                 })
                 .collect(),
             Way::Triangles { .. } => vec![Knob::Points { s_m: 0.0, s_max: 0.0, k: 0.0 }],
+            Way::Views { levels, lookup } => levels
+                .iter()
+                .map(|l| Knob::Views { texels: l.side(), lookup: (*lookup).into() })
+                .collect(),
             Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),
             Way::Meshes { levels, .. } => levels.iter().map(|l| Knob::Share(l.0)).collect(),
         }
@@ -148,7 +184,13 @@ impl Contender<'_> {
                 };
                 (rasterize(soup, surfaces, camera, style), cost)
             }
-            (_, Knob::Points { .. }) => unreachable!("only points have thresholds"),
+            (Way::Views { levels, lookup }, Knob::Views { texels, .. }) => {
+                let level = levels.iter().find(|l| l.side() == texels).expect("a level");
+                let (picture, drawn) = level.draw(camera, *lookup, style);
+                let (primitives, bytes) = (drawn.views as f64, drawn.bytes as f64);
+                (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
+            }
+            _ => unreachable!("a contender is drawn with its own knobs"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The measured table that a pack carries.
 
+use crate::contender::Knob;
 use crate::evaluation::Summary;
 use crate::frame::Band;
 use crate::plan::Plan;
@@ -13,8 +14,7 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
     for band in [Band::Level, Band::Oblique, Band::High] {
         let mut groups: Vec<Vec<&Row>> = Vec::new();
         for row in &sweep.rows {
-            let own = ["pack", "triangles", "bias-1/4", "bias-1"].contains(&row.contender.as_str());
-            if !own || sweep.views[row.view as usize].band != band {
+            if !is_own(&row.contender) || sweep.views[row.view as usize].band != band {
                 continue;
             }
             match groups.iter_mut().find(|g| g[0].knob == row.knob && g[0].height == row.height) {
@@ -35,11 +35,22 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
     Measures { method, rows }
 }
 
+/// Whether a contender draws what is in the pack as it is.
+pub(crate) fn is_own(name: &str) -> bool {
+    ["pack", "triangles", "bias-1/4", "bias-1"].contains(&name) || name.starts_with("views")
+}
+
 fn measure(s: &Summary, band: Band, plan: &Plan) -> Option<Measure> {
-    let t = s.row.knob.thresholds()?;
+    let (representation, level) = match s.row.knob {
+        Knob::Points { s_m, s_max, k } => (kind::POINTS_HEADER, [s_m, s_max, k].map(|v| v as f32)),
+        Knob::Views { texels, lookup } => {
+            (kind::VIEWS_HEADER, [texels as f32, f32::from(lookup as u8), 0.0])
+        }
+        Knob::Share(_) => return None,
+    };
     Some(Measure {
-        representation: kind::POINTS_HEADER,
-        level: [t.finest.0, t.largest.0, t.depth_bias.0].map(|v| v as f32),
+        representation,
+        level,
         pixel_height: s.row.height as f32,
         elevation: band.range(),
         light: match plan.light {

@@ -17,6 +17,15 @@ pub struct View {
     pub band: Band,
 }
 
+impl View {
+    /// The view after a turn about the vertical axis.
+    pub(crate) fn turned(&self, degrees: f64) -> Self {
+        let [x, y, z] = self.to_camera;
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Self { to_camera: [x * cos + z * sin, y, z * cos - x * sin], ..*self }
+    }
+}
+
 /// Sine of the elevation at which views start: a little below the horizon.
 const LOWEST_SIN: f64 = -0.1;
 

@@ -59,9 +59,9 @@ pub mod report;
 mod sweep;
 mod truth;
 
-pub use baselines::{Baselines, own_contenders};
+pub use baselines::{Baselines, own_contenders, views_contenders};
 pub use calibrate::{Calibrated, calibrate};
-pub use contender::{Contender, Cost, Knob};
+pub use contender::{Contender, Cost, Knob, ViewsLookup};
 pub use embed::measures;
 pub use error::EvalError;
 pub use evaluation::{ContenderInfo, Evaluation, SCHEMA, Subject, Summary, json_schema, machine};

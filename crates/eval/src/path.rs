@@ -34,11 +34,21 @@ pub struct PoppingRow {
     pub still: f64,
     /// The largest of a step.
     pub still_worst: f64,
+    /// While the camera goes around the tree, a degree a step: mean over the steps of what the
+    /// picture changes and the truth does not.
+    pub turning: f64,
+    /// The largest of a step.
+    pub turning_worst: f64,
+    /// Mean change of the truth itself on the way around.
+    pub turning_truth: f64,
 }
 
 /// Height at which the popping test starts; each step moves away by a hundredth.
 const PATH_HEIGHT: u32 = 96;
 const STEP: f64 = 1.01;
+
+/// Degrees that the camera turns in a step.
+const TURN: f64 = 1.0;
 
 /// Popping of all contenders on the way from [`PATH_HEIGHT`], in one view.
 pub(crate) fn paths(
@@ -54,6 +64,10 @@ pub(crate) fn paths(
     let truths: Vec<Picture> = heights.iter().map(|&h| truth.picture(view, h, side)).collect();
     let still_truth = [&truths[0], &truths[0]];
     let (own, _) = changes(&truths, |_| still_truth);
+    let around: Vec<View> = (0..=plan.steps).map(|i| view.turned(f64::from(i) * TURN)).collect();
+    let start = heights[0];
+    let turned: Vec<Picture> = around.iter().map(|v| truth.picture(v, start, side)).collect();
+    let (turning_truth, _) = changes(&turned, |_| [&turned[0], &turned[0]]);
     let mut rows = Vec::new();
     for c in contenders {
         // The thresholds that most pictures are seen at: one to a few pixels.
@@ -70,10 +84,13 @@ pub(crate) fn paths(
             .then(|| changes(&heights.iter().map(same).collect::<Vec<_>>(), step).0);
         let follow: Vec<Knob> = match knob {
             Knob::Points { .. } => heights.iter().map(|h| knob.nearer(heights[0] / h)).collect(),
-            Knob::Share(_) => knobs[first..].iter().take(2).copied().collect(),
+            _ => knobs[first..].iter().take(2).copied().collect(),
         };
         let still: Vec<Picture> = follow.into_iter().map(|k| draw(heights[0], k)).collect();
         let (moving, moving_worst) = changes(&moving, step);
+        let draw_turned = |v: &View| c.draw(&truth.frame.camera(v, start, side), knob, style).0;
+        let turning: Vec<Picture> = around.iter().map(draw_turned).collect();
+        let (turning, turning_worst) = changes(&turning, |i: usize| [&turned[i], &turned[i + 1]]);
         let (still, still_worst) = changes(&still, |_| still_truth);
         rows.push(PoppingRow {
             contender: c.name.into(),
@@ -85,6 +102,9 @@ pub(crate) fn paths(
             truth: own,
             still,
             still_worst,
+            turning,
+            turning_worst,
+            turning_truth,
         });
     }
     rows

@@ -1,5 +1,6 @@
 //! How many primitives another way needs for the same error.
 
+use crate::contender::Knob;
 use crate::metrics::Errors;
 use crate::sweep::Row;
 use schemars::JsonSchema;
@@ -59,7 +60,9 @@ const OVERLAP: f64 = 1.5;
 pub fn ratios(rows: &[Row], base: &str) -> Vec<Ratio> {
     let mut names: Vec<&str> = Vec::new();
     let mut heights: Vec<u32> = Vec::new();
-    for r in rows {
+    // A view is one primitive however much it shows.
+    let rows = || rows.iter().filter(|r| !matches!(r.knob, Knob::Views { .. }));
+    for r in rows() {
         if !names.contains(&r.contender.as_str()) {
             names.push(&r.contender);
         }
@@ -67,14 +70,14 @@ pub fn ratios(rows: &[Row], base: &str) -> Vec<Ratio> {
             heights.push(r.height);
         }
     }
-    let views = rows.iter().map(|r| r.view + 1).max().unwrap_or(0);
+    let views = rows().map(|r| r.view + 1).max().unwrap_or(0);
     let mut out = Vec::new();
     for other in names.iter().filter(|n| **n != base) {
         for metric in Metric::ALL {
             for &height in &heights {
                 let of = |name: &str, view: u32| {
                     Curve::new(
-                        rows.iter().filter(|r| {
+                        rows().filter(|r| {
                             r.contender == name && r.view == view && r.height == height
                         }),
                         metric,
@@ -157,7 +160,7 @@ impl Curve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contender::{Cost, Knob};
+    use crate::contender::Cost;
 
     /// A curve n = c/error over `errors`.
     fn rows(name: &str, c: f64, errors: &[f64], view: u32) -> Vec<Row> {

@@ -9,8 +9,9 @@ use crate::list::{DisplayList, Ellipse, Fragment, Triangle};
 use crate::opacity::covers;
 use crate::picture::{Picture, PixelMean};
 use crate::sampling::{Pattern, Sampling};
+use crate::sprite::Sprite;
 use forest_soup::{Camera, Projection};
-use glam::IVec2;
+use glam::{IVec2, Vec3};
 use rayon::prelude::*;
 
 /// How a picture is made.
@@ -118,11 +119,32 @@ impl Canvas<'_> {
     }
 
     fn put(&self, i: u32, band: &mut Band) {
-        let triangles = self.list.triangles.len();
-        match self.list.triangles.get(i as usize) {
-            Some(t) if t.surface.translucent => self.translucent(i, t, band),
-            Some(t) => self.opaque(i, t, band),
-            None => self.ellipse(i, &self.list.ellipses[i as usize - triangles], band),
+        match self.list.thing(i) {
+            Thing::Triangle(t) if t.surface.translucent => self.translucent(i, t, band),
+            Thing::Triangle(t) => self.opaque(i, t, band),
+            Thing::Ellipse(e) => self.ellipse(i, e, band),
+            Thing::Sprite(s) => self.sprite(i, s, band),
+        }
+    }
+
+    fn sprite(&self, i: u32, sprite: &dyn Sprite, band: &mut Band) {
+        let nearest = depth_key(sprite.nearest(), self.parallel);
+        let (min, max) = sprite.pixels();
+        for (x, y) in band.pixels(min, max) {
+            let (xs, ys) = self.pattern.pixel(x, y);
+            let (keys, ids) = band.pixel(self, x, y);
+            for s in 0..xs.len() {
+                if keys[s] <= nearest {
+                    continue;
+                }
+                let (px, py) = (f64::from(x) + f64::from(xs[s]), f64::from(y) + f64::from(ys[s]));
+                let Some(hit) = sprite.sample(px, py, self.pattern.grid(x, y, s)) else { continue };
+                let key = depth_key(hit.depth, self.parallel);
+                if key < keys[s] {
+                    keys[s] = key;
+                    ids[s] = i;
+                }
+            }
         }
     }
 
@@ -199,7 +221,7 @@ impl Canvas<'_> {
             let mut mean = PixelMean::default();
             for s in (0..count).filter(|&s| ids[s] != NONE) {
                 let (px, py) = (f64::from(x) + f64::from(xs[s]), f64::from(y) + f64::from(ys[s]));
-                let f = self.fragment(ids[s], px, py);
+                let f = self.fragment(ids[s], px, py, self.pattern.grid(x, y, s));
                 let depth = if self.parallel { keys[s] } else { -1.0 / keys[s] };
                 let [r, g, b] = f.lit(&self.light);
                 mean.add([r, g, b, 1.0], depth, f.normal.to_array(), share);
@@ -209,15 +231,18 @@ impl Canvas<'_> {
         out
     }
 
-    fn fragment(&self, i: u32, x: f64, y: f64) -> Fragment {
-        let triangles = self.list.triangles.len();
-        match self.list.triangles.get(i as usize) {
-            Some(t) => t.shade(x, y),
-            None => {
-                let e = &self.list.ellipses[i as usize - triangles];
-                // An ellipse comes lit.
-                Fragment { rgb: e.rgb, normal: e.normal, unlit: true }
-            }
+    fn fragment(&self, i: u32, x: f64, y: f64, grid: (u32, u32)) -> Fragment {
+        match self.list.thing(i) {
+            Thing::Triangle(t) => t.shade(x, y),
+            // An ellipse comes lit.
+            Thing::Ellipse(e) => Fragment { rgb: e.rgb, normal: e.normal, unlit: true, sky: 1.0 },
+            Thing::Sprite(s) => match s.sample(x, y, grid) {
+                Some(hit) => {
+                    Fragment { rgb: hit.rgb, normal: hit.normal, unlit: false, sky: hit.sky }
+                }
+                // The same answer as before: it was a hit.
+                None => Fragment { rgb: [0.0; 3], normal: Vec3::ZERO, unlit: true, sky: 1.0 },
+            },
         }
     }
 }
@@ -227,7 +252,7 @@ impl Fragment {
         if self.unlit {
             return self.rgb;
         }
-        let factors = light.unshadowed(self.normal);
+        let factors = light.under_sky(self.normal, self.sky);
         std::array::from_fn(|k| self.rgb[k] * factors[k])
     }
 }
@@ -272,25 +297,45 @@ impl Nearby {
     }
 }
 
+/// One of a list.
+enum Thing<'a> {
+    Triangle(&'a Triangle<'a>),
+    Ellipse(&'a Ellipse),
+    Sprite(&'a dyn Sprite),
+}
+
 impl DisplayList<'_> {
     fn len(&self) -> usize {
-        self.triangles.len() + self.ellipses.len()
+        self.triangles.len() + self.ellipses.len() + self.sprites.len()
+    }
+
+    /// Triangles first, then ellipses, then sprites.
+    fn thing(&self, i: u32) -> Thing<'_> {
+        let i = i as usize;
+        let (triangles, ellipses) = (self.triangles.len(), self.ellipses.len());
+        if let Some(t) = self.triangles.get(i) {
+            Thing::Triangle(t)
+        } else if let Some(e) = self.ellipses.get(i - triangles) {
+            Thing::Ellipse(e)
+        } else {
+            Thing::Sprite(&*self.sprites[i - triangles - ellipses])
+        }
     }
 
     fn nearest_key(&self, i: u32, parallel: bool) -> f32 {
-        let triangles = self.triangles.len();
-        match self.triangles.get(i as usize) {
-            Some(t) => t.key_range[0],
-            None => depth_key(self.ellipses[i as usize - triangles].depth, parallel),
+        match self.thing(i) {
+            Thing::Triangle(t) => t.key_range[0],
+            Thing::Ellipse(e) => depth_key(e.depth, parallel),
+            Thing::Sprite(s) => depth_key(s.nearest(), parallel),
         }
     }
 
     /// Topmost and bottommost row of pixels it may touch.
     fn rows(&self, i: u32) -> (i32, i32) {
-        let triangles = self.triangles.len();
-        let (min, max) = match self.triangles.get(i as usize) {
-            Some(t) => (t.min, t.max),
-            None => self.ellipses[i as usize - triangles].pixels(),
+        let (min, max) = match self.thing(i) {
+            Thing::Triangle(t) => (t.min, t.max),
+            Thing::Ellipse(e) => e.pixels(),
+            Thing::Sprite(s) => s.pixels(),
         };
         (min.y, max.y)
     }

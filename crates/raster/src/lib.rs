@@ -48,6 +48,7 @@ mod picture;
 mod plane;
 mod rays;
 mod sampling;
+mod sprite;
 mod surface;
 
 pub use canvas::{Style, draw};
@@ -55,8 +56,9 @@ pub use capture::{Buffers, Capture, CaptureScene, Skylight, Subject};
 pub use light::{Light, Sun};
 pub use list::{Corner, DisplayList, Ellipse, Projector};
 pub use mesh::rasterize;
-pub use opacity::covers;
+pub use opacity::{covers, sample_hash};
 pub use picture::Picture;
 pub use rays::RayScene;
 pub use sampling::Sampling;
+pub use sprite::{Sprite, SpriteHit};
 pub use surface::Surfaces;

@@ -41,9 +41,14 @@ impl Light {
     /// Factors on the base colour of a surface whose unit normal `normal` faces the eye, without
     /// shadows.
     pub fn unshadowed(&self, normal: Vec3) -> [f32; 3] {
+        self.under_sky(normal, 1.0)
+    }
+
+    /// The same where only a share `skylit` of the sky is seen.
+    pub fn under_sky(&self, normal: Vec3, skylit: f32) -> [f32; 3] {
         match self {
             Light::Albedo => [1.0; 3],
-            Light::Sun(sun) => sun.factors(normal, 1.0, 1.0),
+            Light::Sun(sun) => sun.factors(normal, 1.0, skylit),
         }
     }
 }

@@ -1,9 +1,11 @@
-//! What a canvas draws: triangles and ellipses, projected.
+//! What a canvas draws: triangles, ellipses and sprites, projected.
 
 use crate::plane::{Edges, Plane};
+use crate::sprite::Sprite;
 use crate::surface::{Surface, Surfaces};
 use forest_soup::{Camera, Projection};
 use glam::{DVec2, DVec3, IVec2, Vec2, Vec3};
+use std::sync::Arc;
 
 /// A corner of a triangle in the world.
 #[derive(Clone, Copy, Debug)]
@@ -135,17 +137,23 @@ impl Corner {
 }
 
 /// What a canvas draws. The order does not matter but for things of one and the same depth, where
-/// the earlier wins and triangles go first.
+/// the earlier wins, triangles go first and sprites last.
 #[derive(Clone, Debug, Default)]
 pub struct DisplayList<'a> {
     pub(crate) triangles: Vec<Triangle<'a>>,
     pub(crate) ellipses: Vec<Ellipse>,
+    pub(crate) sprites: Vec<Arc<dyn Sprite + 'a>>,
 }
 
 impl<'a> DisplayList<'a> {
     /// A list of ellipses.
     pub fn of_ellipses(ellipses: Vec<Ellipse>) -> Self {
-        Self { triangles: vec![], ellipses }
+        Self { ellipses, ..Self::default() }
+    }
+
+    /// Adds a sprite.
+    pub fn sprite(&mut self, sprite: Arc<dyn Sprite + 'a>) {
+        self.sprites.push(sprite);
     }
 
     /// The ellipses, to be changed.
@@ -179,6 +187,7 @@ impl<'a> DisplayList<'a> {
     pub fn append(&mut self, mut other: Self) {
         self.triangles.append(&mut other.triangles);
         self.ellipses.append(&mut other.ellipses);
+        self.sprites.append(&mut other.sprites);
     }
 }
 
@@ -189,6 +198,8 @@ pub(crate) struct Fragment {
     /// Towards the eye.
     pub(crate) normal: Vec3,
     pub(crate) unlit: bool,
+    /// Share of the sky that is seen from there.
+    pub(crate) sky: f32,
 }
 
 impl<'a> Triangle<'a> {
@@ -271,6 +282,7 @@ impl<'a> Triangle<'a> {
             rgb: self.surface.at(self.uv(w), self.tint(w)).0,
             normal: (a * w[0] + b * w[1] + c * w[2]).normalize_or_zero(),
             unlit: self.surface.is_unlit(),
+            sky: 1.0,
         }
     }
 }

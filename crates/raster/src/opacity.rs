@@ -12,10 +12,21 @@ pub fn covers(id: u32, x: u32, y: u32, opacity: u8) -> bool {
     if opacity == u8::MAX {
         return true;
     }
-    let sample = mix(x.wrapping_mul(0x9e37_79b9) ^ y.rotate_left(16));
-    let hash = mix(id ^ sample);
     // 16 bits of the hash as a fraction of one, against opacity/255, without a division.
-    (hash >> 16) * 255 < u32::from(opacity) << 16
+    hash(id, x, y) * 255 < u32::from(opacity) << 16
+}
+
+/// The number in `0..1` that [`covers`] compares opacities with: for choices between more than two.
+#[inline]
+pub fn sample_hash(id: u32, x: u32, y: u32) -> f32 {
+    hash(id, x, y) as f32 / 65536.0
+}
+
+/// 16 bits.
+#[inline]
+fn hash(id: u32, x: u32, y: u32) -> u32 {
+    let sample = mix(x.wrapping_mul(0x9e37_79b9) ^ y.rotate_left(16));
+    mix(id ^ sample) >> 16
 }
 
 /// A bijection of 32-bit words that scatters them.

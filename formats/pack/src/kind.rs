@@ -21,6 +21,19 @@ pub const MATERIALS: u16 = 32;
 /// Texels of one texture, RGBA, 8 bits each; the index is the texture's number.
 pub const TEXTURE: u16 = 33;
 
+/// Header of the views representation (owner: `forest-views`).
+pub const VIEWS_HEADER: u16 = 48;
+/// Tile table of a level, 16 bytes a view; the index is the level's number.
+pub const VIEWS_TILES: u16 = 49;
+/// Colour and coverage of a level's pages.
+pub const VIEWS_COLOR: u16 = 50;
+/// Normals of a level's pages.
+pub const VIEWS_NORMAL: u16 = 51;
+/// Depth of a level's pages.
+pub const VIEWS_DEPTH: u16 = 52;
+/// Share of the sky that is seen, of a level's pages.
+pub const VIEWS_SKY: u16 = 53;
+
 /// Name of a kind for people; unknown kinds are named by number.
 pub fn name(kind: u16) -> String {
     match kind {
@@ -34,6 +47,12 @@ pub fn name(kind: u16) -> String {
         POINTS_CALIBRATION => "points.calibration".into(),
         MATERIALS => "materials".into(),
         TEXTURE => "texture".into(),
+        VIEWS_HEADER => "views.header".into(),
+        VIEWS_TILES => "views.tiles".into(),
+        VIEWS_COLOR => "views.color".into(),
+        VIEWS_NORMAL => "views.normal".into(),
+        VIEWS_DEPTH => "views.depth".into(),
+        VIEWS_SKY => "views.sky".into(),
         other => format!("kind-{other}"),
     }
 }

@@ -211,9 +211,10 @@ fn level_table(t: &mut String, e: &Evaluation) {
 fn popping_table(t: &mut String, e: &Evaluation) {
     let Some(first) = e.popping.first() else { return };
     let title = format!(
-        "Change from step to step, {} pixels high (the truth's own as the camera moves: {})",
+        "Change from step to step, {} pixels high (the truth's own as the camera moves: {}, and as it turns: {})",
         first.height,
-        short(first.truth)
+        short(first.truth),
+        short(first.turning_truth)
     );
     let cells = [
         "way",
@@ -223,6 +224,8 @@ fn popping_table(t: &mut String, e: &Evaluation) {
         "camera moves: what the truth does not do",
         "worst",
         "the same with one cut",
+        "camera turns: what the truth does not do",
+        "worst",
     ];
     head(t, &title, &cells);
     for p in &e.popping {
@@ -234,6 +237,8 @@ fn popping_table(t: &mut String, e: &Evaluation) {
             short(p.moving),
             short(p.moving_worst),
             p.moving_fixed.map_or("–".into(), short),
+            short(p.turning),
+            short(p.turning_worst),
         ];
         row(t, "td", &cells);
     }

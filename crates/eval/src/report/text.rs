@@ -12,7 +12,7 @@ use std::fmt::{Error, Write};
 pub fn text(e: &Evaluation) -> Result<String, Error> {
     let mut t = String::new();
     let s = &e.subject;
-    let own = |x: &Summary| ["pack", "triangles"].contains(&x.row.contender.as_str());
+    let own = |x: &Summary| crate::embed::is_own(&x.row.contender);
     writeln!(
         t,
         "{}: {} points of {} triangles, {}; {} light, {} views, {} samples",
@@ -84,20 +84,24 @@ pub fn text(e: &Evaluation) -> Result<String, Error> {
             t,
             "\npopping: RMSE from picture to picture as the camera moves away by 1 %; the truth changes by {}\n\
              still: only the level follows, the camera stands (a mesh: one switch of level)\n\
-             moving: what changes and the truth does not; one cut: the same without switches of level",
-            e.popping.first().map_or("0".into(), |p| short(p.truth))
+             moving: what changes and the truth does not; one cut: the same without switches of level\n\
+             turning: the same as the camera goes around by 1°; the truth changes by {}",
+            e.popping.first().map_or("0".into(), |p| short(p.truth)),
+            e.popping.first().map_or("0".into(), |p| short(p.turning_truth))
         )?;
         for p in &e.popping {
             writeln!(
                 t,
-                "{:<11} {:<22} still {:>6} (worst {}), moving {:>6} (worst {}), one cut {}",
+                "{:<11} {:<22} still {:>6} (worst {}), moving {:>6} (worst {}), one cut {}, turning {} (worst {})",
                 p.contender,
                 knob(p.knob),
                 short(p.still),
                 short(p.still_worst),
                 short(p.moving),
                 short(p.moving_worst),
-                p.moving_fixed.map_or("-".into(), short)
+                p.moving_fixed.map_or("-".into(), short),
+                short(p.turning),
+                short(p.turning_worst)
             )?;
         }
     }

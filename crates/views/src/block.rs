@@ -1,0 +1,140 @@
+//! Reading the views of a pack.
+
+use crate::bake::section_kind;
+use crate::codec::{Channel, decode};
+use crate::directions::Directions;
+use crate::header::{TileRecord, ViewFrame, ViewsHeader};
+use crate::validate::validate;
+use forest_pack::{Pack, PackError, SectionId, header, kind};
+use glam::DVec3;
+
+/// Most bytes of one channel of one level.
+const MAX_CHANNEL_BYTES: u64 = 8 << 30;
+
+/// The views representation of a pack; texels stay in the memory map until they are decoded.
+#[derive(Clone, Debug)]
+pub struct ViewsBlock<'a> {
+    /// The header.
+    pub header: ViewsHeader,
+    /// The tiles of each level, one a view.
+    pub tiles: Vec<&'a [TileRecord]>,
+    /// The frames of all views.
+    pub frames: Vec<ViewFrame>,
+    pack: &'a Pack,
+}
+
+impl<'a> ViewsBlock<'a> {
+    /// Whether a pack has views.
+    pub fn is_in(pack: &Pack) -> bool {
+        pack.contains(SectionId::new(kind::VIEWS_HEADER, 0))
+    }
+
+    /// Opens and checks the views of a pack.
+    ///
+    /// # Errors
+    /// When a section is missing or damaged, or breaks a rule of SPEC.md, section 6.
+    pub fn open(pack: &'a Pack) -> Result<Self, PackError> {
+        let id = SectionId::new(kind::VIEWS_HEADER, 0);
+        let header: ViewsHeader = header::decode(pack, id)?;
+        let lengths = |channel: Channel| -> Vec<Option<u64>> {
+            let of = |level| {
+                let id = SectionId::new(section_kind(channel), level);
+                pack.sections().find(|(s, _)| *s == id).map(|(_, s)| s.length)
+            };
+            (0..header.levels.len() as u32).map(of).collect()
+        };
+        let mut tiles = Vec::new();
+        crate::validate::validate_header(&header)
+            .map_err(|problem| PackError::invalid(pack.path(), id, problem))?;
+        for level in 0..header.levels.len() as u32 {
+            tiles.push(pack.records::<TileRecord>(SectionId::new(kind::VIEWS_TILES, level))?);
+        }
+        validate(&header, &tiles, &lengths).map_err(|(kind, level, problem)| {
+            PackError::invalid(pack.path(), SectionId::new(kind, level), problem)
+        })?;
+        let frames = header.frames();
+        Ok(Self { header, tiles, frames, pack })
+    }
+
+    /// The directions of the views.
+    pub fn directions(&self) -> &Directions {
+        &self.header.directions
+    }
+
+    /// World position of the middle of all tiles.
+    pub fn center(&self) -> DVec3 {
+        DVec3::from_array(self.header.center)
+    }
+
+    /// Stored bytes of a channel of a level; 0 if it is not stored.
+    pub fn channel_bytes(&self, channel: Channel, level: usize) -> u64 {
+        if !self.header.channels.has(channel) {
+            return 0;
+        }
+        channel.level_bytes(self.header.quality, &self.header.levels[level])
+    }
+
+    /// Reads and decodes what a renderer needs of `level`.
+    ///
+    /// # Errors
+    /// When a section is damaged.
+    pub fn texels(&self, level: usize) -> Result<Texels, PackError> {
+        let read = |channel: Channel| -> Result<Vec<u8>, PackError> {
+            if !self.header.channels.has(channel) {
+                return Ok(Vec::new());
+            }
+            let id = SectionId::new(section_kind(channel), level as u32);
+            let stored = self.pack.bytes(id, MAX_CHANNEL_BYTES)?;
+            let width = self.header.levels[level].page[0];
+            Ok(decode(channel, self.header.quality, width, &stored))
+        };
+        let [color, normal, depth, sky] = Channel::ALL.map(read);
+        let wide = |d: &[u8; 2]| u16::from_le_bytes(*d);
+        Ok(Texels {
+            width: self.header.levels[level].page[0] as usize,
+            height: self.header.levels[level].page[1] as usize,
+            color: color?.as_chunks::<4>().0.to_vec(),
+            normal: normal?.as_chunks::<2>().0.to_vec(),
+            depth: depth?.as_chunks::<2>().0.iter().map(wide).collect(),
+            sky: sky?,
+        })
+    }
+}
+
+/// The decoded pages of a level, one under the other; channels that are not stored are empty.
+#[derive(Clone, Debug, Default)]
+pub struct Texels {
+    /// Texels across a page.
+    pub width: usize,
+    /// Texels down a page.
+    pub height: usize,
+    /// sRGB colour, not premultiplied, and coverage.
+    pub color: Vec<[u8; 4]>,
+    /// Normals in the view's frame: right and up; see [`decode_normal`].
+    pub normal: Vec<[u8; 2]>,
+    /// Depth: 0 at the front, 65535 at the back of the ball of radius [`ViewsHeader::radius`].
+    pub depth: Vec<u16>,
+    /// Share of the sky that is seen · 255.
+    pub sky: Vec<u8>,
+}
+
+impl Texels {
+    /// Index of texel (x, y) of the whole tile; `None` where nothing is stored.
+    #[inline]
+    pub fn index(&self, tile: &TileRecord, x: i32, y: i32) -> Option<usize> {
+        let (x, y) = (x - i32::from(tile.left), y - i32::from(tile.top));
+        if x < 0 || y < 0 || x >= i32::from(tile.width) || y >= i32::from(tile.height) {
+            return None;
+        }
+        let row = usize::from(tile.page) * self.height + usize::from(tile.y) + y as usize;
+        Some(row * self.width + usize::from(tile.x) + x as usize)
+    }
+}
+
+/// World-space unit normal of a stored one: its part towards the camera is not negative.
+pub fn decode_normal([x, y]: [u8; 2], frame: &ViewFrame) -> DVec3 {
+    let part = |v: u8| f64::from(v) / 127.5 - 1.0;
+    let (x, y) = (part(x), part(y));
+    let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+    (frame.right * x + frame.up * y + frame.back * z).normalize_or(frame.back)
+}
