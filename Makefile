@@ -5,6 +5,8 @@
 #   make check    format check, clippy and docs only
 #   make bench    measure bakes; writes docs/BENCH.md and docs/LEVELS.txt
 #   make report   evaluate the trees; writes docs/REPORT.md, the README's figures, out/report/*.html
+#   make views    measure views; writes docs/VIEWS.md and docs/views.svg
+#   make three    draw exported views in three.js, in a headless browser; writes docs/three.png
 #   make picture  draw the README's picture anew
 #   make golden   write the golden packs anew, after a meant change of the format
 #   make samples  grow sample-data anew
@@ -15,7 +17,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: demo test check bench report picture golden samples fuzz deny setup
+.PHONY: demo test check bench report views three picture golden samples fuzz deny setup
 
 # What the build needs from the system: a linker with C and C++ compilers, for zstd and meshoptimizer.
 setup:
@@ -42,10 +44,18 @@ demo: setup
 	  "sample-data/broadleaf_young.gltf@4.5,0,1:yaw=70" "sample-data/shrub.obj@2,0,3:yaw=20,scale=1.3" \
 	  "sample-data/shrub.obj@-2.4,0,2.2:yaw=200" -o $(OUT)/block.fpack --force
 	@target/release/forest-bake draw $(OUT)/block.fpack -o $(OUT)/block.png --size 768 --view 15,8 -q
+	@target/release/forest-bake views sample-data/conifer.glb -o $(OUT)/conifer.fpack \
+	  --preview $(OUT)/conifer-views.png
+	@target/release/forest-bake verify $(OUT)/conifer.fpack
+	@target/release/forest-bake draw $(OUT)/conifer.fpack -o $(OUT)/conifer-lookup.png --as views \
+	  --lookup nearest,blend,depth --view 25,12 -q
+	@target/release/forest-bake export $(OUT)/conifer.fpack -o $(OUT)/conifer-three --for three --force -q
 	@target/release/forest-bake levels sample-data/conifer.glb > $(OUT)/conifer-levels.txt
 	@target/release/forest-bake inspect $(OUT)/block.fpack
 	@echo; echo "Packs:    $(OUT)/*.fpack"; \
-	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together)"; \
+	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together;"; \
+	echo "          conifer-views.png: from 289 directions; conifer-lookup.png: nearest, blended, through depth)"; \
+	echo "Export:   $(OUT)/conifer-three (for three.js)"; \
 	echo "Report:   $(OUT)/conifer-levels.txt (what each radius rule and order keeps, by level)"
 
 check: setup
@@ -68,6 +78,28 @@ report: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/report
 	target/release/forest-bake eval --schema > docs/eval.schema.json
+
+views: setup
+	$(CARGO) build --release --workspace --bins
+	target/release/views
+
+# Node.js, npm and Chromium, and three.js by npm: not needed by anything else.
+three: setup
+	@missing=; \
+	command -v npm >/dev/null || missing="$$missing nodejs npm"; \
+	command -v chromium >/dev/null || [ -n "$$CHROMIUM" ] || missing="$$missing chromium"; \
+	if [ -n "$$missing" ]; then \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "installing:$$missing"; apt-get update -qq && apt-get install -y -qq $$missing; \
+	  else echo "install these packages first: sudo apt-get install$$missing"; exit 1; fi; fi
+	$(CARGO) build --release --workspace --bins
+	@mkdir -p $(OUT)
+	cd tests/three && npm install --no-package-lock --no-audit --no-fund --silent
+	target/release/forest-bake views sample-data/broadleaf_young.gltf -o $(OUT)/three.fpack \
+	  --layout octahedral:12 --quality lossless --channels color,normal,depth --force
+	target/release/forest-bake export $(OUT)/three.fpack -o $(OUT)/three --for three --name tree --force
+	cd tests/three && node shot.mjs ../../$(OUT)/three ../../docs/three.png --size 240 --show lit \
+	  --from '0,0,1;1,0.1,0.4;1,0.5,-0.6;-0.3,0.2,-1;-1,0.3,0.2;0.2,1,0.3;0,1,0;0.6,0.3,0.9'
 
 picture: setup
 	$(CARGO) build --release --workspace --bins

@@ -5,7 +5,7 @@ use forest_export::{Engine, ExportFile, PlainFormat, for_engine, plain};
 use forest_soup::{TriangleSoup, srgb8_to_linear};
 use forest_tests::soups::of_triangles;
 use forest_tests::{bake_views, open};
-use forest_views::{Directions, Dome, Layout, Quality, ViewsBlock, ViewsOptions};
+use forest_views::{Channel, Directions, Dome, Layout, Quality, ViewsBlock, ViewsOptions, decode};
 use glam::{DVec3, Vec3};
 
 /// A ball whose colour is its normal: ½ + ½·n, linear.
@@ -189,7 +189,7 @@ fn plain_files_open_in_other_readers() {
     let pack_bytes = baked(3, Dome::Upper);
     let pack = open(&pack_bytes).unwrap();
     let block = ViewsBlock::open(&pack).unwrap();
-    let files = plain(&block, PlainFormat::Png, "ball").unwrap();
+    let files = plain(&block, &[PlainFormat::Png], "ball").unwrap();
     let names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
     let all =
         ["ball_color.png", "ball_normal.png", "ball_depth.png", "ball_ao.png", "ball.views.json"];
@@ -201,7 +201,7 @@ fn plain_files_open_in_other_readers() {
     let side: serde_json::Value = serde_json::from_slice(&files[4].bytes).unwrap();
     assert_eq!(side["tiles"][0]["toCamera"][2], -1.0);
 
-    let exr = plain(&block, PlainFormat::Exr, "ball").unwrap();
+    let exr = plain(&block, &[PlainFormat::Exr], "ball").unwrap();
     let path = tempfile::tempdir().unwrap().keep().join(&exr[0].name);
     std::fs::write(&path, &exr[0].bytes).unwrap();
     let read = exr::prelude::read_first_flat_layer_from_file(&path).unwrap();
@@ -219,13 +219,57 @@ fn plain_files_open_in_other_readers() {
     assert!((plane("Z")[at] + 1.0).abs() < 0.02 && plane("Z")[0] == f32::INFINITY);
     assert!((plane("N.Z")[at] + 1.0).abs() < 0.02 && (plane("A")[at] - 1.0).abs() < 1e-3);
 
-    for file in plain(&block, PlainFormat::Ktx2, "ball").unwrap() {
+    for file in plain(&block, &[PlainFormat::Ktx2], "ball").unwrap() {
         if file.name.ends_with(".ktx2") {
             let reader = ktx2::Reader::new(&file.bytes).unwrap();
             let h = reader.header();
             assert_eq!((h.layer_count, h.level_count, h.pixel_width), (9, 6, 32), "{}", file.name);
         }
     }
+}
+
+#[test]
+fn texture_arrays_keep_coverage_at_every_mip() {
+    let options = ViewsOptions {
+        directions: Directions::octahedral(9, Dome::Upper),
+        texels: 64,
+        quality: Quality::Lossless,
+        ..ViewsOptions::default()
+    };
+    let bytes = bake_views(&forest_tests::soups::leaves(3000, 0.03, 9), &options).unwrap();
+    let pack = open(&bytes).unwrap();
+    let block = ViewsBlock::open(&pack).unwrap();
+    let files = plain(&block, &[PlainFormat::Ktx2, PlainFormat::Png], "leaves").unwrap();
+    let color = files.iter().find(|f| f.name == "leaves_color.ktx2").unwrap();
+    let reader = ktx2::Reader::new(&color.bytes).unwrap();
+    // Area of the texels of all layers that pass a test at ½.
+    let passing: Vec<f64> = reader
+        .levels()
+        .enumerate()
+        .map(|(i, level)| {
+            let (side, stored) = (64u32 >> i, (64u32 >> i).max(4));
+            let texels = decode(Channel::Color, Quality::Block, stored, level.data);
+            let seen = |(k, t): &(usize, &[u8; 4])| {
+                let (x, y) = (*k as u32 % stored, *k as u32 / stored % stored);
+                x < side && y < side && t[3] >= 128
+            };
+            let count = texels.as_chunks::<4>().0.iter().enumerate().filter(seen).count();
+            count as f64 / f64::from(side * side)
+        })
+        .collect();
+    for (i, p) in passing[..4].iter().enumerate() {
+        assert!((p / passing[0] - 1.0).abs() < 0.05, "mip {i}: {passing:?}");
+    }
+    let side = files.iter().find(|f| f.name == "leaves.views.json").unwrap();
+    let side: serde_json::Value = serde_json::from_slice(&side.bytes).unwrap();
+    let cutoff = |name: &str| {
+        let list = side["files"].as_array().unwrap();
+        list.iter().find(|f| f["name"] == name).unwrap()["alphaCutoff"].clone()
+    };
+    assert_eq!(
+        (cutoff("leaves_color.ktx2"), cutoff("leaves_color.png")),
+        (0.5.into(), serde_json::Value::Null)
+    );
 }
 
 #[test]

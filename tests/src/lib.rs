@@ -15,7 +15,7 @@ use forest_raster::{CaptureScene, Sampling, Style, Surfaces};
 use forest_soup::{Camera, Projection, TriangleSoup};
 use forest_views::{Frame, Lookup, ViewsBlock, ViewsError, ViewsOptions};
 use glam::DVec3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Bakes into memory; the pack has a fixed `meta` section.
 ///
@@ -55,6 +55,23 @@ pub fn bake_views(soup: &TriangleSoup, options: &ViewsOptions) -> Result<Vec<u8>
     forest_views::bake(&scene, &frame, options, &mut writer, &|_| {})?;
     writer.finish()?;
     Ok(std::fs::read(&path).expect("the pack that was just written"))
+}
+
+/// The trees that a report is about: these of sample-data, and these of ../shared/trees where they
+/// are; the others are named on stderr.
+pub fn report_trees(samples: &[&str], shared: &[&str]) -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut trees: Vec<PathBuf> =
+        samples.iter().map(|t| root.join("sample-data").join(t)).collect();
+    for tree in shared {
+        let path = root.join("../shared/trees").join(tree);
+        if path.exists() {
+            trees.push(path);
+        } else {
+            eprintln!("skipped: {} is not there", path.display());
+        }
+    }
+    trees
 }
 
 /// Opens a pack in memory.

@@ -4,7 +4,7 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use forest_draw::{ViewsLevel, read_surfaces};
 use forest_eval::report::{self, Axis};
 use forest_eval::{
@@ -90,7 +90,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let points = if PointsBlock::is_in(&pack) { Some(PointsBlock::open(&pack)?) } else { None };
     let views = if ViewsBlock::is_in(&pack) { Some(ViewsBlock::open(&pack)?) } else { None };
     if points.is_none() && views.is_none() {
-        bail!("{}: has neither points nor views", path.display());
+        // Says what is missing.
+        PointsBlock::open(&pack)?;
     }
     let judge = Judge::new(&source.soup, &plan, quiet);
     let truth = judge.truth()?;

@@ -50,6 +50,16 @@ enum FormatArg {
     Ktx2,
 }
 
+impl From<FormatArg> for PlainFormat {
+    fn from(f: FormatArg) -> Self {
+        match f {
+            FormatArg::Png => Self::Png,
+            FormatArg::Exr => Self::Exr,
+            FormatArg::Ktx2 => Self::Ktx2,
+        }
+    }
+}
+
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let pack = Pack::open(&args.pack)?;
     let block = ViewsBlock::open(&pack)?;
@@ -67,16 +77,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         };
         files.extend(for_engine(&block, engine, &name)?);
     }
-    for format in &args.format {
-        let format = match format {
-            FormatArg::Png => PlainFormat::Png,
-            FormatArg::Exr => PlainFormat::Exr,
-            FormatArg::Ktx2 => PlainFormat::Ktx2,
-        };
-        let new = plain(&block, format, &name)?;
-        // The side file is the same for all but the cutoff of texture arrays.
-        files.retain(|f| new.iter().all(|n| n.name != f.name));
-        files.extend(new);
+    let formats: Vec<PlainFormat> = args.format.iter().map(|&f| f.into()).collect();
+    if !formats.is_empty() {
+        files.extend(plain(&block, &formats, &name)?);
     }
     std::fs::create_dir_all(&args.output).with_context(|| args.output.display().to_string())?;
     for file in &files {

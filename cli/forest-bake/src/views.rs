@@ -5,9 +5,12 @@ use crate::output;
 use crate::source::SourceArgs;
 use crate::target;
 use anyhow::Result;
+use forest_draw::PointsSubject;
 use forest_export::contact_sheet;
 use forest_pack::{Pack, PackWriter, SectionId, header, kind};
-use forest_raster::{CaptureScene, Surfaces};
+use forest_points::{BakeOptions, PointsBlock, SurfelSize};
+use forest_raster::{Buffers, CaptureScene, Subject, Surfaces};
+use forest_soup::TriangleSoup;
 use forest_views::{
     BakeReport, Channels, Directions, Dome, Fit, Frame, Layout, Quality, ViewsBlock, ViewsError,
     ViewsOptions, bake,
@@ -51,6 +54,9 @@ pub(crate) struct Args {
     /// How views are framed.
     #[arg(long, value_enum, default_value = "tight")]
     fit: FitArg,
+    /// What to draw views from: triangles, or points no wider than half a texel.
+    #[arg(long, value_enum, default_value = "auto")]
+    detail: Detail,
     /// Longest side of an atlas page; what does not fit goes to further pages.
     #[arg(long, default_value_t = 4096, value_name = "TEXELS")]
     max_page: u32,
@@ -72,6 +78,16 @@ enum ChannelArg {
     Depth,
     /// Share of the sky that is seen.
     Ao,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Detail {
+    /// Points if there are far more triangles than texels, and a trial shows that they look the same.
+    Auto,
+    /// All triangles.
+    Triangles,
+    /// Points, baked for it; without occlusion.
+    Points,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -104,16 +120,20 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let prepare = Instant::now();
     let surfaces = Surfaces::new(&source.soup.materials, &source.soup.textures);
     let mut scene = CaptureScene::new(&source.soup, &surfaces);
+    let points = args.points(&source.soup, &scene, &frame, &options, quiet)?;
+    let points = points.as_ref().map(PointsBlock::open).transpose()?;
     let prepare = prepare.elapsed().as_secs_f64();
     let sky = Instant::now();
     if options.channels.sky {
         scene = scene.with_skylight();
     }
     let sky = sky.elapsed().as_secs_f64();
+    let cut = points.as_ref().map(PointsSubject::new);
+    let subject: &dyn Subject = cut.as_ref().map_or(&scene as &dyn Subject, |c| c);
     let mut writer = PackWriter::create(&args.output)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
     let bar = output::bar(u64::from(options.directions.count()), "views", quiet);
-    let report = bake(&scene, &frame, &options, &mut writer, &|n| bar.set_position(n))?;
+    let report = bake(subject, &frame, &options, &mut writer, &|n| bar.set_position(n))?;
     bar.finish_and_clear();
     if let Some(pack) = &kept {
         let own = |kind| (kind::VIEWS_HEADER..=kind::VIEWS_SKY).contains(&kind);
@@ -135,7 +155,67 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     Ok(())
 }
 
+/// Triangles for each texel of a tile from which points are tried.
+const TRIANGLES_A_TEXEL: f64 = 64.0;
+
+/// Largest root mean square difference of premultiplied colour and coverage at which points pass
+/// for triangles, and of the mean coverage.
+const SAME_RMSE: f64 = 0.03;
+const SAME_COVERAGE: f64 = 0.02;
+
 impl Args {
+    /// The pack of points to capture instead of the triangles, if there should be one.
+    fn points(
+        &self,
+        soup: &TriangleSoup,
+        scene: &CaptureScene,
+        frame: &Frame,
+        options: &ViewsOptions,
+        quiet: bool,
+    ) -> Result<Option<Pack>> {
+        let texels = f64::from(self.texels).powi(2);
+        let many = soup.triangles.len() as f64 > TRIANGLES_A_TEXEL * texels;
+        // Points know nothing of the sky.
+        let wanted = match self.detail {
+            Detail::Triangles => false,
+            Detail::Auto => many && !options.channels.sky,
+            Detail::Points if options.channels.sky => {
+                let rule = "leave ao out of --channels, or take --detail triangles";
+                return Err(Usage(format!("--detail points has no occlusion: {rule}")).into());
+            }
+            Detail::Points => true,
+        };
+        if !wanted {
+            return Ok(None);
+        }
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("points.fpack");
+        let mut writer = PackWriter::create(&path)?;
+        // Finer than a quarter of a texel is never drawn.
+        let size = 2.0 * frame.half / f64::from(self.texels) / 4.0;
+        let points = BakeOptions {
+            surfel_size: SurfelSize::Units(size),
+            triangles: false,
+            ..BakeOptions::default()
+        };
+        forest_points::bake(soup, &points, &mut writer, &|_| {})?;
+        writer.finish()?;
+        // The map outlives the file's name.
+        let pack = Pack::open(&path)?;
+        if self.detail == Detail::Auto {
+            let block = PointsBlock::open(&pack)?;
+            let subject = PointsSubject::new(&block);
+            let [rmse, coverage] = difference(&subject, scene, frame, options);
+            if !quiet {
+                eprintln!("points instead of triangles: RMSE {rmse:.4}, coverage {coverage:+.4}");
+            }
+            if rmse > SAME_RMSE || coverage.abs() > SAME_COVERAGE {
+                return Ok(None);
+            }
+        }
+        Ok(Some(pack))
+    }
+
     fn options(&self) -> Result<ViewsOptions> {
         let dome = if self.full_sphere { Dome::Full } else { Dome::Upper };
         let wrong = || {
@@ -179,6 +259,23 @@ impl Args {
         options.validate().map_err(Usage)?;
         Ok(options)
     }
+}
+
+/// Root mean square difference of two subjects' captures over three views, and the relative one of
+/// their mean coverage.
+fn difference(a: &dyn Subject, b: &dyn Subject, frame: &Frame, options: &ViewsOptions) -> [f64; 2] {
+    let (mut square, mut n, mut covered) = (0.0, 0.0, [0.0; 2]);
+    for i in [0, 1, 2] {
+        let from = options.directions.direction(i * (options.directions.count() - 1) / 2);
+        let camera = frame.camera(from, options.texels);
+        let [a, b] = [a, b].map(|s| s.capture(&camera, 16, &mut Buffers::default()).picture);
+        covered = [covered[0] + a.mean_coverage(), covered[1] + b.mean_coverage()];
+        for (p, q) in a.pixels.iter().zip(&b.pixels).filter(|(p, q)| p[3] + q[3] > 0.0) {
+            square += (0..4).map(|k| f64::from(p[k] - q[k]).powi(2)).sum::<f64>() / 4.0;
+            n += 1.0;
+        }
+    }
+    [f64::sqrt(square / f64::max(n, 1.0)), covered[0] / covered[1].max(1e-9) - 1.0]
 }
 
 /// What was done, for people and programs.

@@ -34,7 +34,9 @@
 //! ```
 
 mod points;
+mod subject;
 mod views;
 
 pub use points::{Drawn, PointsFrame, draw_points, point_ellipses, read_surfaces};
+pub use subject::PointsSubject;
 pub use views::{ViewsDrawn, ViewsLevel};

@@ -104,31 +104,15 @@ impl<'a> Impostor<'a> {
         let sampler = |&(view, share): &(u32, f32)| {
             (ViewSampler::new(level.block, &level.texels, level.level, view), share)
         };
-        let (x, y, depth) = camera.project(center);
-        let nearest = depth - header.radius;
-        // The ball, as large as its nearest place would show it.
-        let closest = match camera.projection {
-            Projection::Orthographic { .. } => 1.0,
-            Projection::Perspective { .. } => nearest.max(1e-3 * header.radius),
-        };
-        let reach = header.radius * camera.pixels_per_unit(closest) + 1.0;
-        let pixel = |x: f64, y: f64| IVec2::new(x.floor() as i32, y.floor() as i32);
-        let behind = closest != 1.0 && depth + header.radius <= 0.0;
-        let pixels = if behind {
-            (IVec2::ONE, IVec2::ZERO)
-        } else if closest != 1.0 && nearest <= 1e-3 * header.radius {
-            (IVec2::MIN, IVec2::MAX)
-        } else {
-            (pixel(x - reach, y - reach), pixel(x + reach, y + reach))
-        };
+        let depth = (center - camera.eye).dot(camera.forward);
         Self {
             camera,
             lookup,
             views: chosen.iter().filter(|v| v.1 > 0.0).map(sampler).collect(),
             half: header.half,
             eye: (camera.eye - center) / header.half,
-            pixels,
-            nearest,
+            pixels: ball_pixels(camera, center, header.radius),
+            nearest: depth - header.radius,
         }
     }
 
@@ -140,10 +124,12 @@ impl<'a> Impostor<'a> {
         let aside = (camera.right * right + camera.up * up) / camera.pixels_per_unit(1.0);
         match camera.projection {
             Projection::Orthographic { .. } => {
-                Ray { origin: self.eye + aside / self.half, direction: camera.forward }
+                let origin = self.eye + aside / self.half;
+                Ray { origin, direction: camera.forward, from: f64::NEG_INFINITY }
             }
             Projection::Perspective { .. } => {
-                Ray { origin: self.eye, direction: (camera.forward + aside).normalize() }
+                let direction = (camera.forward + aside).normalize();
+                Ray { origin: self.eye, direction, from: 0.0 }
             }
         }
     }
@@ -183,6 +169,35 @@ impl<'a> Impostor<'a> {
             }
         }
         None
+    }
+}
+
+/// First and last pixel of the box around a ball's picture.
+fn ball_pixels(camera: &Camera, center: DVec3, radius: f64) -> (IVec2, IVec2) {
+    let to = center - camera.eye;
+    let (depth, aside) = (to.dot(camera.forward), [to.dot(camera.right), -to.dot(camera.up)]);
+    let middle = [camera.width, camera.height].map(|n| f64::from(n) * 0.5);
+    let scale = camera.pixels_per_unit(1.0);
+    let ends = |k: usize| match camera.projection {
+        Projection::Orthographic { .. } => {
+            Some([aside[k] - radius, aside[k] + radius].map(|v| middle[k] + v * scale))
+        }
+        // The angles of the two tangents in the plane of this axis.
+        Projection::Perspective { .. } => {
+            let (angle, distance) = (aside[k].atan2(depth), aside[k].hypot(depth));
+            let half = (radius / distance).min(1.0).asin();
+            let seen = distance > radius && angle.abs() + half < std::f64::consts::FRAC_PI_2;
+            seen.then(|| [angle - half, angle + half].map(|a| middle[k] + a.tan() * scale))
+        }
+    };
+    match (ends(0), ends(1)) {
+        (Some(x), Some(y)) => {
+            let pixel = |i: usize| IVec2::new(x[i].floor() as i32, y[i].floor() as i32);
+            (pixel(0), pixel(1))
+        }
+        // Around the eye, or reaching behind it: anywhere.
+        _ if depth > -radius => (IVec2::MIN, IVec2::MAX),
+        _ => (IVec2::ONE, IVec2::ZERO),
     }
 }
 

@@ -7,15 +7,12 @@ use crate::header::{LevelHeader, TileRecord, ViewFrame, ViewsHeader};
 use crate::options::{Quality, ViewsOptions};
 use crate::pack_tiles::{Layout, arrange};
 use crate::tile::{TileLevel, cutoff, levels};
+use crate::validate::validate_header;
 use forest_pack::{Codec, PackWriter, SectionId, header, kind};
 use forest_raster::{Buffers, Subject};
-use forest_soup::{Camera, Projection};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-
-/// Samples along the side of the smallest capture: tiny tiles are not sampled less.
-const LEAST_GRID: u32 = 64;
 
 /// Views that a thread captures with the same buffers.
 const BATCH: u32 = 8;
@@ -107,6 +104,8 @@ pub fn bake(
         let info =
             LevelHeader { texels: options.texels >> level, page: layout.page, pages: layout.pages };
         header.levels.push(info);
+        // What the reader would refuse is not written.
+        validate_header(&header).map_err(ViewsError::Options)?;
         if level == 0 {
             texels = TexelCounts::of(&tiles, &info);
         }
@@ -139,11 +138,6 @@ pub(crate) fn section_kind(channel: Channel) -> u16 {
 }
 
 impl ViewsOptions {
-    /// Samples along the side of a texel of the finest level that are asked for.
-    fn samples_a_side(&self) -> u32 {
-        self.samples.max(LEAST_GRID.div_ceil(self.texels))
-    }
-
     fn samples_a_texel(&self) -> u32 {
         self.samples_a_side().pow(2)
     }
@@ -163,10 +157,7 @@ fn view(
     buffers: &mut Buffers,
 ) -> (Vec<TileLevel>, Duration) {
     let from = options.directions.direction(i);
-    let distance = 2.0 * frame.radius;
-    let projection = Projection::Orthographic { height: 2.0 * frame.half };
-    let eye = frame.center + from * distance;
-    let camera = Camera::new(eye, -from, projection, [options.texels; 2]);
+    let (camera, distance) = (frame.camera(from, options.texels), frame.eye_distance());
     let capture = subject.capture(&camera, options.samples_a_side(), buffers);
     let start = Instant::now();
     let view = ViewFrame::new(from);

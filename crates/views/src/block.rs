@@ -5,11 +5,8 @@ use crate::codec::{Channel, decode};
 use crate::directions::Directions;
 use crate::header::{TileRecord, ViewFrame, ViewsHeader};
 use crate::validate::validate;
-use forest_pack::{Pack, PackError, SectionId, header, kind};
+use forest_pack::{Codec, Pack, PackError, SectionId, header, kind};
 use glam::DVec3;
-
-/// Most bytes of one channel of one level.
-const MAX_CHANNEL_BYTES: u64 = 8 << 30;
 
 /// The views representation of a pack; texels stay in the memory map until they are decoded.
 #[derive(Clone, Debug)]
@@ -46,6 +43,17 @@ impl<'a> ViewsBlock<'a> {
         let mut tiles = Vec::new();
         crate::validate::validate_header(&header)
             .map_err(|problem| PackError::invalid(pack.path(), id, problem))?;
+        // Texels lie as a GPU reads them: nothing grows when it is read.
+        let texels = kind::VIEWS_COLOR..=kind::VIEWS_SKY;
+        for (id, section) in pack.sections().filter(|(id, _)| texels.contains(&id.kind)) {
+            if section.codec != Codec::None {
+                return Err(PackError::invalid(
+                    pack.path(),
+                    id,
+                    "is compressed; texels must not be",
+                ));
+            }
+        }
         for level in 0..header.levels.len() as u32 {
             tiles.push(pack.records::<TileRecord>(SectionId::new(kind::VIEWS_TILES, level))?);
         }
@@ -84,7 +92,7 @@ impl<'a> ViewsBlock<'a> {
                 return Ok(Vec::new());
             }
             let id = SectionId::new(section_kind(channel), level as u32);
-            let stored = self.pack.bytes(id, MAX_CHANNEL_BYTES)?;
+            let stored = self.pack.bytes(id, self.channel_bytes(channel, level))?;
             let width = self.header.levels[level].page[0];
             Ok(decode(channel, self.header.quality, width, &stored))
         };

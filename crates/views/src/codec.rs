@@ -87,7 +87,7 @@ pub fn encode(channel: Channel, quality: Quality, width: u32, raw: &[u8]) -> Vec
 }
 
 /// Decodes what [`encode`] made; `stored` must have the length of a whole number of block rows.
-pub(crate) fn decode(channel: Channel, quality: Quality, width: u32, stored: &[u8]) -> Vec<u8> {
+pub fn decode(channel: Channel, quality: Quality, width: u32, stored: &[u8]) -> Vec<u8> {
     if quality == Quality::Lossless || stored.is_empty() {
         return stored.to_vec();
     }

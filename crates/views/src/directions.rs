@@ -56,9 +56,10 @@ impl Directions {
         Self { layout: Layout::Octahedral { side: views.isqrt().max(2) }, dome }
     }
 
-    /// Rings of at most `views` views, with the least distance between a direction and its
+    /// Rings of at most `views` views (at least 5), with the least distance between a direction and its
     /// nearest view.
     pub fn rings(views: u32, dome: Dome) -> Self {
+        let views = views.max(5);
         let of = |rings: u32| {
             let all = match dome {
                 Dome::Upper => (views - 1) / rings,
@@ -134,14 +135,15 @@ impl Directions {
         }
     }
 
-    /// The view whose direction is nearest to `d`; below an upper dome, that of the horizon below
-    /// which it lies.
+    /// The view whose direction is nearest to `d` of those around its place in the layout, by
+    /// arithmetic: at most an eighth farther away than the nearest of all, unless rings are much
+    /// closer than the views on them. Below an upper dome, that of the horizon below which it lies.
     pub fn nearest(&self, d: DVec3) -> u32 {
         let d = self.within(d);
         match self.layout {
             Layout::Rings { rings, points } => {
                 let (ring, turn) = ring_place(d, rings, points);
-                // The nearest view of a ring has the nearest azimuth: it is on one of two rings.
+                // The nearest view of a ring has the nearest azimuth.
                 let lower = ring.floor() as i32;
                 let near = |ring| self.ring_view(ring, turn.round() as i64, rings, points);
                 let [a, b] = [lower, (lower + 1).min(rings as i32)].map(near);

@@ -3,7 +3,7 @@
 use crate::directions::Directions;
 use crate::header::ViewFrame;
 use crate::options::Fit;
-use forest_soup::TriangleSoup;
+use forest_soup::{Camera, Projection, TriangleSoup};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -23,6 +23,19 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// The camera of the view from direction `from`, with `texels` a side: two radii away from the
+    /// centre.
+    pub fn camera(&self, from: DVec3, texels: u32) -> Camera {
+        let eye = self.center + from * self.eye_distance();
+        let projection = Projection::Orthographic { height: 2.0 * self.half };
+        Camera::new(eye, -from, projection, [texels; 2])
+    }
+
+    /// From the eye to the centre.
+    pub(crate) fn eye_distance(&self) -> f64 {
+        2.0 * self.radius
+    }
+
     /// The frame of the finite triangles of `soup` in views from `directions`; `None` if nothing
     /// of it has an extent.
     pub fn of(soup: &TriangleSoup, directions: &Directions, fit: Fit) -> Option<Self> {

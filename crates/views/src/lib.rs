@@ -64,7 +64,7 @@ mod validate;
 
 pub use bake::{BakeReport, TexelCounts, bake};
 pub use block::{Texels, ViewsBlock, decode_normal};
-pub use codec::{Channel, encode};
+pub use codec::{Channel, decode, encode};
 pub use directions::{Blend, Directions, Dome, Layout, MAX_VIEWS};
 pub use error::ViewsError;
 pub use fit::Frame;

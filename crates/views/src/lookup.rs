@@ -12,6 +12,8 @@ pub struct Ray {
     pub origin: DVec3,
     /// Its unit direction, away from the eye.
     pub direction: DVec3,
+    /// Distance from which it counts: 0 for a ray from an eye, −∞ for a parallel one.
+    pub from: f64,
 }
 
 /// What a ray finds in a view.
@@ -57,6 +59,9 @@ pub struct ViewSampler<'a> {
 /// texel's depth is the mean of what it shows.
 const SLACK: f64 = 16.0;
 
+/// Neighbouring texels whose depths differ by at most this many texels show one surface.
+const JOINED: f64 = 4.0;
+
 /// Most texels that a ray is followed through.
 const MOST_STEPS: f64 = 256.0;
 
@@ -78,7 +83,7 @@ impl<'a> ViewSampler<'a> {
         let Some(path) = Path::new(self, ray) else { return Found::Empty };
         let [x, y] = path.texel(0.0);
         match self.shade(x, y, path.distance(0.0)) {
-            Some(hit) if hit.alpha > 0.0 => Found::Hit(hit),
+            Some(hit) if hit.alpha > 0.0 && hit.distance >= ray.from => Found::Hit(hit),
             _ => Found::Empty,
         }
     }
@@ -90,19 +95,30 @@ impl<'a> ViewSampler<'a> {
         // Heights towards the camera of the view, from the front of the ball to its back.
         let steps = (2.0 * self.reach * path.speed).ceil().clamp(1.0, MOST_STEPS);
         let stride = -2.0 * self.reach / steps;
+        let joined = JOINED * 2.0 / self.side;
         let mut hidden = false;
+        // The surface that the ray was before in the texel before this one.
+        let mut ahead: Option<f64> = None;
         for n in 0..steps as u32 {
             let near = self.reach + stride * f64::from(n);
             let far = near + stride;
+            if path.distance(far) < ray.from {
+                continue; // behind the eye
+            }
             let Some(surface) = self.surface(path.texel(0.5 * (near + far)), threshold) else {
+                ahead = None;
                 continue;
             };
             if far > surface {
+                ahead = Some(surface);
                 continue; // still before it
             }
-            if near >= surface {
-                let [x, y] = path.texel(surface);
-                return self.shade(x, y, path.distance(surface)).map_or(Found::Empty, Found::Hit);
+            // A surface that rises along the ray is met between two texels.
+            let met = ahead.take().is_some_and(|before| surface - before <= joined);
+            if near >= surface || met {
+                let [x, y] = path.texel(surface.min(near));
+                let distance = path.distance(surface.min(near));
+                return self.shade(x, y, distance).map_or(Found::Empty, Found::Hit);
             }
             hidden = true;
         }
@@ -189,7 +205,8 @@ impl Path {
     fn new(view: &ViewSampler, ray: &Ray) -> Option<Self> {
         let ViewFrame { right, up, back } = *view.frame;
         let slope = ray.direction.dot(back);
-        // More than 85° off: no view can say anything.
+        // More than 85° off: no view can say anything. (A parallel camera that looks straight up
+        // from below an upper dome sees nothing.)
         if slope > -0.087 {
             return None;
         }

@@ -84,7 +84,21 @@ impl Default for ViewsOptions {
     }
 }
 
+/// Samples across the largest capture: each thread holds its square, 8 bytes a sample.
+const MAX_GRID: u32 = 16384;
+
+/// Texels of all views at the finest level, which are held while levels are packed: 12 bytes each.
+const MAX_BAKED_TEXELS: u64 = 1 << 29;
+
+/// Samples along the side of the smallest capture: tiny tiles are not sampled less.
+const LEAST_GRID: u32 = 64;
+
 impl ViewsOptions {
+    /// Samples along the side of a texel of the finest level that are taken: whole blocks of four.
+    pub fn samples_a_side(&self) -> u32 {
+        self.samples.max(LEAST_GRID.div_ceil(self.texels)).next_multiple_of(4)
+    }
+
     /// Checks ranges.
     ///
     /// # Errors
@@ -96,6 +110,18 @@ impl ViewsOptions {
         }
         if !(1..=16).contains(&self.samples) {
             return Err(format!("{} samples a side; from 1 to 16", self.samples));
+        }
+        let grid = self.texels * self.samples_a_side();
+        if grid > MAX_GRID {
+            let samples = self.samples_a_side();
+            let what = format!("tiles of {} texels with {samples} samples a side", self.texels);
+            return Err(format!("{what}: {grid} samples across; the limit is {MAX_GRID}"));
+        }
+        let all = u64::from(self.directions.count()) * u64::from(self.texels).pow(2);
+        if all > MAX_BAKED_TEXELS {
+            let views = self.directions.count();
+            let what = format!("{views} views of {}² texels", self.texels);
+            return Err(format!("{what}: {all} texels; the limit is {MAX_BAKED_TEXELS}"));
         }
         // A tile with its gutter must fit a page.
         let least = (self.texels + 2).next_multiple_of(4);

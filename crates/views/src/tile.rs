@@ -134,7 +134,9 @@ fn stored(texels: &[Texel], side: usize, passing: f64, samples: f32) -> TileLeve
                 if is_inside { dithered(t[ALPHA], samples, tx as u32, ty as u32) } else { 0 };
             raw[0].extend([0, 1, 2].map(|k| linear_to_srgb8(t[COLOR + k])));
             raw[0].push(alpha);
-            let normal = Vec3::new(t[NORMAL], t[NORMAL + 1], t[NORMAL + 2]).normalize_or(Vec3::Z);
+            // The mean of smooth normals may point away a little: not further than sideways.
+            let z = t[NORMAL + 2].max(0.0);
+            let normal = Vec3::new(t[NORMAL], t[NORMAL + 1], z).normalize_or(Vec3::Z);
             raw[1].extend([normal.x, normal.y].map(|v| quantised(v * 0.5 + 0.5)));
             let depth = (t[DEPTH].clamp(0.0, 1.0) * 65535.0).round() as u16;
             raw[2].extend(depth.to_le_bytes());

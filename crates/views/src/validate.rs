@@ -75,6 +75,9 @@ pub(crate) fn validate(
             if (t.width == 0) != (t.height == 0) {
                 return fail(format!("tile {i} is {}×{} texels", t.width, t.height));
             }
+            if !(1..=255).contains(&t.cutoff) {
+                return fail(format!("tile {i} has cutoff {}; from 1 to 255", t.cutoff));
+            }
             if t.width == 0 {
                 continue;
             }
@@ -93,9 +96,6 @@ pub(crate) fn validate(
                     let problem = format!("tile {i} covers {at} and {size} on of {most} texels");
                     return fail(problem);
                 }
-            }
-            if !(1..=255).contains(&t.cutoff) {
-                return fail(format!("tile {i} has cutoff {}; from 1 to 255", t.cutoff));
             }
         }
     }

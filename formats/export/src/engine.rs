@@ -6,7 +6,7 @@
 
 use crate::ExportError;
 use crate::grid::{Texel, WholeTiles};
-use crate::picture::{ExportFile, png};
+use crate::picture::{ExportFile, check_size, png};
 use forest_soup::{linear_to_srgb8, srgb8_to_linear};
 use forest_views::{Dome, Layout, ViewFrame, ViewsBlock};
 use glam::DVec3;
@@ -119,13 +119,15 @@ pub fn for_engine(
     name: &str,
 ) -> Result<Vec<ExportFile>, ExportError> {
     let order = tiles(block, engine)?;
+    let total = block.header.levels[0].texels * (order.len() as u32).isqrt();
+    check_size(total, total)?;
     let whole = WholeTiles::read(block, 0)?;
     let side = (order.len() as u32).isqrt();
     let channels = block.header.channels;
     let atlas = Atlas { block, engine, whole: &whole, order: &order, side };
     let mut files = Vec::new();
     let mut add = |file: &str, pixel: fn(&Shown) -> [u8; 4]| -> Result<(), ExportError> {
-        files.push(ExportFile { name: file.into(), bytes: png(&atlas.image(pixel))? });
+        files.push(ExportFile { name: file.into(), bytes: png(atlas.image(pixel))? });
         Ok(())
     };
     match engine {

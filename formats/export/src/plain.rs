@@ -4,7 +4,7 @@ use crate::ExportError;
 use crate::engine::keyed;
 use crate::grid::WholeTiles;
 use crate::ktx2::{Format, TextureArray};
-use crate::picture::{ExportFile, png};
+use crate::picture::{ExportFile, check_size, check_texels, png};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, SmallVec, WritableImage,
 };
@@ -31,20 +31,33 @@ pub enum PlainFormat {
 /// Alpha from which a texel of a texture array is shown.
 const CUTOFF: f32 = 0.5;
 
-/// Writes the views of a pack; `name` is that of the tree. A side file tells directions and sizes.
+/// Writes the views of a pack in `formats`; `name` is that of the tree. A side file tells directions,
+/// sizes and, for each file, the alpha from which a texel is shown (null: alpha is the coverage).
 ///
 /// # Errors
 /// When the pack is damaged or a file cannot be encoded.
 pub fn plain(
     block: &ViewsBlock,
-    format: PlainFormat,
+    formats: &[PlainFormat],
     name: &str,
 ) -> Result<Vec<ExportFile>, ExportError> {
-    let mut files = match format {
-        PlainFormat::Png => png_files(block, name)?,
-        PlainFormat::Exr => vec![exr_file(block, name)?],
-        PlainFormat::Ktx2 => ktx2_files(block, name)?,
-    };
+    let (mut files, mut list) = (Vec::new(), Vec::new());
+    for format in formats {
+        let new = match format {
+            PlainFormat::Png => png_files(block, name)?,
+            PlainFormat::Exr => vec![exr_file(block, name)?],
+            PlainFormat::Ktx2 => ktx2_files(block, name)?,
+        };
+        let keyed = *format == PlainFormat::Ktx2;
+        let cutoff = |f: &ExportFile| keyed && f.name.ends_with("_color.ktx2");
+        list.extend(new.iter().map(|f| {
+            json!({
+                "name": f.name,
+                "alphaCutoff": if cutoff(f) { json!(CUTOFF) } else { json!(null) },
+            })
+        }));
+        files.extend(new);
+    }
     let h = &block.header;
     let columns = columns(block);
     let count = h.directions.count();
@@ -66,8 +79,7 @@ pub fn plain(
         "tileWidth": 2.0 * h.half,
         "depthRadius": h.radius,
         "center": h.center,
-        "alphaCutoff": if format == PlainFormat::Ktx2 { json!(CUTOFF) } else { json!(null) },
-        "files": files.iter().map(|f| f.name.clone()).collect::<Vec<_>>(),
+        "files": list,
         "tiles": (0..count).map(tile).collect::<Vec<_>>(),
     });
     let text = serde_json::to_string_pretty(&side).expect("plain JSON") + "\n";
@@ -87,6 +99,7 @@ fn png_files(block: &ViewsBlock, name: &str) -> Result<Vec<ExportFile>, ExportEr
     let whole = WholeTiles::read(block, 0)?;
     let (columns, side) = (columns(block), whole.side);
     let count = block.directions().count();
+    check_size(columns * side, count.div_ceil(columns) * side)?;
     let size = [columns * side, count.div_ceil(columns) * side];
     let mut color = RgbaImage::new(size[0], size[1]);
     let mut normal = RgbImage::new(size[0], size[1]);
@@ -108,15 +121,15 @@ fn png_files(block: &ViewsBlock, name: &str) -> Result<Vec<ExportFile>, ExportEr
     let mut add = |what: &str, bytes: Vec<u8>| {
         files.push(ExportFile { name: format!("{name}_{what}.png"), bytes });
     };
-    add("color", png(&color)?);
+    add("color", png(color)?);
     if channels.normal {
-        add("normal", png(&normal)?);
+        add("normal", png(normal)?);
     }
     if channels.depth {
-        add("depth", png(&depth)?);
+        add("depth", png(depth)?);
     }
     if channels.sky {
-        add("ao", png(&sky)?);
+        add("ao", png(sky)?);
     }
     Ok(files)
 }
@@ -125,6 +138,7 @@ fn exr_file(block: &ViewsBlock, name: &str) -> Result<ExportFile, ExportError> {
     let whole = WholeTiles::read(block, 0)?;
     let (columns, side) = (columns(block), whole.side);
     let count = block.directions().count();
+    check_size(columns * side, count.div_ceil(columns) * side)?;
     let size = [columns * side, count.div_ceil(columns) * side].map(|v| v as usize);
     let (h, texels) = (&block.header, size[0] * size[1]);
     let mut names = vec!["R", "G", "B", "A"];
@@ -176,8 +190,20 @@ fn exr_file(block: &ViewsBlock, name: &str) -> Result<ExportFile, ExportError> {
     Ok(ExportFile { name: format!("{name}.exr"), bytes: out.into_inner() })
 }
 
+/// Alpha away from ½ on its own side, so that what a block encoder changes does not carry it across.
+fn apart(alpha: u8) -> u8 {
+    let a = f32::from(alpha);
+    let kept = 1.0 - 2.0 * MARGIN;
+    (if alpha < 128 { a * kept } else { 255.0 - (255.0 - a) * kept }).round() as u8
+}
+
+/// Share of the range of alpha on either side of ½ that [`apart`] leaves free.
+const MARGIN: f32 = 0.125;
+
 fn ktx2_files(block: &ViewsBlock, name: &str) -> Result<Vec<ExportFile>, ExportError> {
     let h = &block.header;
+    let texels = u64::from(h.levels[0].texels).pow(2) * u64::from(h.directions.count());
+    check_texels(texels)?;
     let channels: Vec<Channel> = Channel::ALL.into_iter().filter(|c| h.channels.has(*c)).collect();
     let mut levels: Vec<Vec<Vec<u8>>> = vec![Vec::new(); channels.len()];
     for level in 0..h.levels.len() {
@@ -194,7 +220,7 @@ fn ktx2_files(block: &ViewsBlock, name: &str) -> Result<Vec<ExportFile>, ExportE
                     match channel {
                         Channel::Color => {
                             let [r, g, b, a] = t.color;
-                            raw.extend([r, g, b, keyed(a, cutoff, CUTOFF)]);
+                            raw.extend([r, g, b, apart(keyed(a, cutoff, CUTOFF))]);
                         }
                         Channel::Normal => raw.extend(t.normal),
                         Channel::Depth => raw.extend(t.depth.to_le_bytes()),

@@ -2,10 +2,10 @@
 
 use crate::ExportError;
 use crate::grid::WholeTiles;
+use crate::picture::{check_size, png};
 use forest_soup::{linear_to_srgb8, srgb8_to_linear};
 use forest_views::{Layout, ViewsBlock};
-use image::{ImageFormat, Rgb, RgbImage};
-use std::io::Cursor;
+use image::{Rgb, RgbImage};
 
 /// Linear grey behind the tree.
 const BACKGROUND: f32 = 0.6;
@@ -28,6 +28,7 @@ pub fn contact_sheet(block: &ViewsBlock) -> Result<Vec<u8>, ExportError> {
     let levels = &block.header.levels;
     let fits = |texels: u32| texels * columns.max(rows) <= SIDE;
     let level = levels.iter().position(|l| fits(l.texels)).unwrap_or(levels.len() - 1);
+    check_size(columns * levels[level].texels, rows * levels[level].texels)?;
     let tiles = WholeTiles::read(block, level)?;
     let side = tiles.side;
     let grey = linear_to_srgb8(BACKGROUND);
@@ -47,7 +48,5 @@ pub fn contact_sheet(block: &ViewsBlock) -> Result<Vec<u8>, ExportError> {
             sheet.put_pixel(view % columns * side + x, row * side + y, Rgb([r, g, b].map(over)));
         }
     }
-    let mut png = Cursor::new(Vec::new());
-    sheet.write_to(&mut png, ImageFormat::Png)?;
-    Ok(png.into_inner())
+    png(sheet)
 }

@@ -6,8 +6,9 @@ use forest_eval::{Evaluation, Metric, Summary};
 use forest_import::{Block, Limits};
 use forest_raster::{Light, RayScene, Style, Surfaces, rasterize};
 use forest_tests::reference::{REFERENCES, VIEWS, against, reference};
+use forest_tests::report_trees;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 const TREES: [&str; 3] = ["conifer.glb", "broadleaf_young.gltf", "shrub.obj"];
@@ -48,15 +49,7 @@ fn main() -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let out = root.join("out/report");
     std::fs::create_dir_all(&out)?;
-    let mut trees: Vec<PathBuf> = TREES.map(|t| root.join("sample-data").join(t)).into();
-    for tree in SHARED {
-        let path = root.join("../shared/trees").join(tree);
-        if path.exists() {
-            trees.push(path);
-        } else {
-            eprintln!("skipped: {} is not there", path.display());
-        }
-    }
+    let trees = report_trees(&TREES, &SHARED);
     let mut found = Vec::new();
     for tree in &trees {
         found.push(evaluate(tree, &out)?);

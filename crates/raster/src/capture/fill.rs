@@ -152,18 +152,27 @@ impl Edges {
         self.gain.map(|[gx, _]| i64::from(gx) * i64::from(BLOCK_ONE))
     }
 
-    /// Negative for samples that are outside, from their places in a block whose corner has the
-    /// values `corner`.
+    /// Gains from a block's corner to its samples; wrapped where an edge is [`MOST_GAIN`] long.
     #[inline(always)]
-    fn outside(&self, corner: [i64; 3], xs: &[i32; LANES], ys: &[i32; LANES]) -> [i32; LANES] {
-        let mut sign = [0i32; LANES];
-        for ([gx, gy], corner) in self.gain.into_iter().zip(corner) {
-            // Within the block an edge that passes near it has small values; of one far away only
-            // the sign counts.
-            let start = corner.clamp(-(1 << 30), 1 << 30) as i32;
+    fn lanes(&self, xs: &[i32; LANES], ys: &[i32; LANES]) -> [[i32; LANES]; 3] {
+        let mut out = [[0i32; LANES]; 3];
+        for ([gx, gy], out) in self.gain.into_iter().zip(&mut out) {
             for lane in 0..LANES {
-                sign[lane] |= start + gx * xs[lane] + gy * ys[lane];
+                out[lane] = gx.wrapping_mul(xs[lane]).wrapping_add(gy.wrapping_mul(ys[lane]));
             }
+        }
+        out
+    }
+
+    /// Negative for samples that are outside of a block whose corner has the values `corner`.
+    #[inline(always)]
+    fn outside(corner: [i64; 3], lanes: &[[i32; LANES]; 3]) -> [i32; LANES] {
+        // Within the block an edge that passes near it has small values; of one far away only the
+        // sign counts.
+        let [a, b, c] = corner.map(|v| v.clamp(-(1 << 30), 1 << 30) as i32);
+        let mut sign = [0i32; LANES];
+        for lane in 0..LANES {
+            sign[lane] = (a + lanes[0][lane]) | (b + lanes[1][lane]) | (c + lanes[2][lane]);
         }
         sign
     }
@@ -200,7 +209,7 @@ impl CaptureScene<'_> {
         samples: &Samples,
     ) -> bool {
         let middle = projection.vertex(c.center);
-        let reach = (c.radius * projection.scale) as i32 + ONE;
+        let reach = ((c.radius * projection.scale) as i32).saturating_add(ONE);
         let range = |at: i32, n| blocks(at.saturating_sub(reach), at.saturating_add(reach), n);
         match (range(middle.x, samples.size[0]), range(middle.y, samples.size[1])) {
             (Some(columns), Some(rows)) => {
@@ -229,8 +238,13 @@ impl CaptureScene<'_> {
         let wide = edges.gain.iter().flatten().any(|g| g.abs() > MOST_GAIN);
         samples.touch(columns, rows);
         let steps = edges.steps();
+        let (mut lanes, mut slopes) = ([[0; LANES]; 3], [0.0; LANES]);
         for y in rows[0]..=rows[1] {
             let (xs, ys) = (places.of_row(y), &places.y);
+            // Samples lie alike in all rows of blocks, unless pixels are several blocks high.
+            if y == rows[0] || places.x.len() > 1 {
+                (lanes, slopes) = (edges.lanes(xs, ys), depth.lanes(xs, ys));
+            }
             let top = y as i32 * BLOCK_ONE;
             let mut corner = edges.at(columns[0] as i32 * BLOCK_ONE, top);
             for x in columns[0]..=columns[1] {
@@ -244,9 +258,9 @@ impl CaptureScene<'_> {
                 let outside = if wide {
                     edges.outside_wide(here, xs, ys)
                 } else {
-                    edges.outside(here, xs, ys)
+                    Edges::outside(here, &lanes)
                 };
-                let depths = depth.block(at, xs, ys);
+                let depths = depth.block(at, &slopes);
                 let block = samples.block_mut(number);
                 // The sign bit of each says whether the triangle wins the sample.
                 let mut wins = [0i32; LANES];
@@ -361,14 +375,24 @@ impl DepthPlane {
         Self { origin: planes.origin, first: a, slopes: planes.slopes([b - a, c - a]), range }
     }
 
+    /// Gains from a block's corner to its samples.
+    #[inline(always)]
+    fn lanes(&self, xs: &[i32; LANES], ys: &[i32; LANES]) -> [f32; LANES] {
+        let mut out = [0.0; LANES];
+        for lane in 0..LANES {
+            out[lane] = self.slopes[0] * xs[lane] as f32 + self.slopes[1] * ys[lane] as f32;
+        }
+        out
+    }
+
     /// Bits of the depths at the samples of the block at `at`.
     #[inline(always)]
-    fn block(&self, at: [i32; 2], xs: &[i32; LANES], ys: &[i32; LANES]) -> [i32; LANES] {
+    fn block(&self, at: [i32; 2], lanes: &[f32; LANES]) -> [i32; LANES] {
         let [x, y] = [(at[0] - self.origin[0]) as f32, (at[1] - self.origin[1]) as f32];
+        let corner = self.first + self.slopes[0] * x + self.slopes[1] * y;
         let mut out = [0; LANES];
         for lane in 0..LANES {
-            let (x, y) = (x + xs[lane] as f32, y + ys[lane] as f32);
-            let z = self.first + self.slopes[0] * x + self.slopes[1] * y;
+            let z = corner + lanes[lane];
             // Slivers extrapolate wildly: stay within the corners' depths.
             let z = if z > self.range[0] { z } else { self.range[0] };
             out[lane] = depth_bits(if z < self.range[1] { z } else { self.range[1] });
