@@ -3,6 +3,8 @@
 //! [`draw_points`] draws the cut that [`forest_points::select()`] chooses on the canvas of
 //! [`forest_raster`], with the same samples as the ground truth: spheroids as ellipses, triangles
 //! with their textures and alpha rule, opacity by the hash rule, no sorting and no blending.
+//! [`ViewsLevel`] draws a level of views the same way, sample by sample; [`PointsSubject`] lets views
+//! be captured from points.
 //!
 //! ```
 //! use forest_draw::draw_points;

@@ -13,7 +13,10 @@
 //! mean alpha: no mips, whose filtered alpha an alpha test would get wrong. What is partly
 //! transparent covers a sample by the hash rule ([`covers`]); nothing is blended or sorted.
 //!
-//! Renderers of other things (points, billboards) fill a [`DisplayList`] and [`draw`] it, so that
+//! [`CaptureScene`] takes many parallel views of one soup, fast and with less care for single
+//! samples: what view atlases are baked from.
+//!
+//! Renderers of other things (points, views) fill a [`DisplayList`] and [`draw`] it, so that
 //! there is one canvas.
 //!
 //! ```

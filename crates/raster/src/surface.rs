@@ -58,31 +58,14 @@ impl Surface {
     /// Linear RGB under vertex colour `tint`, and coverage. The colour of what covers nothing is
     /// black.
     pub(crate) fn at(&self, uv: Vec2, tint: [f32; 4]) -> ([f32; 3], f32) {
-        let [r, g, b, _] = self.material.base_color;
-        let (rgb, alpha) = match &self.texture {
-            Some(texture) => {
-                let [r, g, b, a] = texture.sample(uv);
-                let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
-                ([r, g, b].map(|v| v * scale), a)
-            }
-            None => ([r, g, b], 1.0),
-        };
-        let coverage = self.material.coverage(alpha, tint[3]);
-        (std::array::from_fn(|k| rgb[k] * tint[k]), coverage)
+        let sample = self.texture.as_ref().map(|t| t.sample(uv));
+        let coverage = self.material.coverage(sample.map_or(1.0, |s| s[3]), tint[3]);
+        (self.tinted(sample, tint), coverage)
     }
 
     /// Linear RGB, not premultiplied, of `texels` texels (an area) about `uv`.
     pub(crate) fn color(&self, uv: Vec2, texels: f32, tint: [f32; 4]) -> [f32; 3] {
-        let [r, g, b, _] = self.material.base_color;
-        let rgb = match &self.texture {
-            Some(texture) => {
-                let [r, g, b, a] = texture.sample_area(uv, texels);
-                let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
-                [r, g, b].map(|v| v * scale)
-            }
-            None => [r, g, b],
-        };
-        std::array::from_fn(|k| rgb[k] * tint[k])
+        self.tinted(self.texture.as_ref().map(|t| t.sample_area(uv, texels)), tint)
     }
 
     /// Texels of its texture; 0 without one.
@@ -93,14 +76,17 @@ impl Surface {
     /// Mean over a triangle of what it shows: linear RGB weighted by alpha, not premultiplied;
     /// from up to 2^`depth` samples.
     pub(crate) fn mean(&self, uvs: [Vec2; 3], tint: [f32; 4], depth: u32) -> [f32; 3] {
-        let [r, g, b, _] = self.material.base_color;
-        let rgb = match &self.texture {
-            Some(texture) => {
-                let [r, g, b, a] = texture.integrate(uvs, depth);
+        self.tinted(self.texture.as_ref().map(|t| t.integrate(uvs, depth)), tint)
+    }
+
+    /// A premultiplied sample of the texture, if there is one, without its alpha and under a tint.
+    fn tinted(&self, sample: Option<[f32; 4]>, tint: [f32; 4]) -> [f32; 3] {
+        let rgb = match sample {
+            Some([r, g, b, a]) => {
                 let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
                 [r, g, b].map(|v| v * scale)
             }
-            None => [r, g, b],
+            None => [0, 1, 2].map(|k| self.material.base_color[k]),
         };
         std::array::from_fn(|k| rgb[k] * tint[k])
     }
