@@ -436,6 +436,24 @@ fn tiles_of_one_texel_have_the_mean_of_the_tree() {
 }
 
 #[test]
+fn the_coarsest_levels_keep_their_coverage_when_drawn() {
+    let pack = open(&bake_views(&leaves(400, 0.2, 7), &options(9, 16)).unwrap()).unwrap();
+    let block = ViewsBlock::open(&pack).unwrap();
+    let from = block.directions().direction(3);
+    let eye = block.center() + from * (3.0 * block.header.radius);
+    let projection = Projection::Orthographic { height: 8.0 * block.header.half };
+    let camera = Camera::new(eye, -from, projection, [64; 2]);
+    let covered = |level: usize| {
+        let level = ViewsLevel::read(&block, level).unwrap();
+        level.draw(&camera, Lookup::Nearest, &Style::default()).0.mean_coverage()
+    };
+    for level in 1..5 {
+        let ratio = covered(level) / covered(0);
+        assert!((ratio - 1.0).abs() < 0.03, "level {level}: {ratio}");
+    }
+}
+
+#[test]
 fn what_exceeds_a_page_goes_to_another() {
     let soup = leaves(300, 0.3, 5);
     let small = ViewsOptions { max_page: 132, ..options(9, 128) };

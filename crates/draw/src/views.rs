@@ -101,6 +101,7 @@ impl<'a> Impostor<'a> {
             Lookup::Depth if !header.channels.depth => Lookup::Blend,
             other => other,
         };
+        let side = f64::from(level.side());
         let sampler = |&(view, share): &(u32, f32)| {
             (ViewSampler::new(level.block, &level.texels, level.level, view), share)
         };
@@ -111,7 +112,8 @@ impl<'a> Impostor<'a> {
             views: chosen.iter().filter(|v| v.1 > 0.0).map(sampler).collect(),
             half: header.half,
             eye: (camera.eye - center) / header.half,
-            pixels: ball_pixels(camera, center, header.radius),
+            // Texels are blurred by their width: those at the edge reach out of the ball.
+            pixels: ball_pixels(camera, center, header.radius + 4.0 * header.half / side),
             nearest: depth - header.radius,
         }
     }
