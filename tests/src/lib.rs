@@ -144,7 +144,7 @@ fn use_views(pack: &Pack) -> Result<usize, PackError> {
     Ok(drawn)
 }
 
-/// A golden pack whose section number `which` (of the points representation) is `data` instead:
+/// A golden pack whose section number `which` is `data` instead:
 /// with sound hashes, so that what is tested is the rules, not the hash. `None` for a number that
 /// does not exist.
 pub fn with_section(golden: &[u8], which: u8, data: &[u8]) -> Option<Vec<u8>> {

@@ -222,8 +222,8 @@ impl Sprite for Impostor<'_> {
         let hit = self.find(&ray, grid)?;
         let place = (ray.origin + ray.direction * hit.distance - self.eye) * self.half;
         let depth = place.dot(self.camera.forward);
-        let behind = !matches!(self.camera.projection, Projection::Orthographic { .. });
-        if behind && depth <= 0.0 {
+        let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
+        if perspective && depth <= 0.0 {
             return None;
         }
         // On the side that is seen: views a few degrees off may see the other.

@@ -139,10 +139,20 @@ impl Texels {
     }
 }
 
-/// World-space unit normal of a stored one: its part towards the camera is not negative.
-pub fn decode_normal([x, y]: [u8; 2], frame: &ViewFrame) -> DVec3 {
-    let part = |v: u8| f64::from(v) / 127.5 - 1.0;
-    let (x, y) = (part(x), part(y));
-    let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+/// Right, up and towards the camera of a stored normal, whose last part is not negative.
+pub fn normal_parts(stored: [u8; 2]) -> [f64; 3] {
+    let [x, y] = stored.map(|v| f64::from(v) / 127.5 - 1.0);
+    [x, y, (1.0 - x * x - y * y).max(0.0).sqrt()]
+}
+
+/// World-space unit normal of a stored one.
+pub fn decode_normal(stored: [u8; 2], frame: &ViewFrame) -> DVec3 {
+    let [x, y, z] = normal_parts(stored);
     (frame.right * x + frame.up * y + frame.back * z).normalize_or(frame.back)
+}
+
+/// Height towards the camera above the plane through the centre of a stored depth, in radii of
+/// [`ViewsHeader::radius`]: 1 … −1.
+pub fn decode_height(stored: u16) -> f64 {
+    1.0 - 2.0 * f64::from(stored) / 65535.0
 }

@@ -63,7 +63,7 @@ mod tile;
 mod validate;
 
 pub use bake::{BakeReport, TexelCounts, bake};
-pub use block::{Texels, ViewsBlock, decode_normal};
+pub use block::{Texels, ViewsBlock, decode_height, decode_normal, normal_parts};
 pub use codec::{Channel, decode, encode};
 pub use directions::{Blend, Directions, Dome, Layout, MAX_VIEWS};
 pub use error::ViewsError;

@@ -1,6 +1,6 @@
 //! Rays through views: from a sample of a picture to a texel.
 
-use crate::block::{Texels, ViewsBlock, decode_normal};
+use crate::block::{Texels, ViewsBlock, decode_height, decode_normal};
 use crate::header::{TileRecord, ViewFrame};
 use forest_soup::srgb8_to_linear;
 use glam::DVec3;
@@ -140,7 +140,7 @@ impl<'a> ViewSampler<'a> {
     fn surface(&self, [x, y]: [f64; 2], threshold: f32) -> Option<f64> {
         let i = self.texels.index(self.tile, x.floor() as i32, y.floor() as i32)?;
         let covers = f32::from(self.texels.color[i][3]) > threshold * 255.0;
-        covers.then(|| self.reach * (1.0 - 2.0 * f64::from(self.texels.depth[i]) / 65535.0))
+        covers.then(|| self.reach * decode_height(self.texels.depth[i]))
     }
 
     /// The four texels about (x, y), in texels of the whole tile.

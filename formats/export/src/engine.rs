@@ -8,7 +8,7 @@ use crate::ExportError;
 use crate::grid::{Texel, WholeTiles};
 use crate::picture::{ExportFile, check_size, png};
 use forest_soup::{linear_to_srgb8, srgb8_to_linear};
-use forest_views::{Dome, Layout, ViewFrame, ViewsBlock};
+use forest_views::{Dome, Layout, ViewFrame, ViewsBlock, decode_height, normal_parts};
 use glam::DVec3;
 use image::{Rgba, RgbaImage};
 use serde_json::{Value, json};
@@ -239,9 +239,7 @@ impl Atlas<'_> {
                 for x in 0..texels {
                     let (tx, ty) = source(turns, x, y, texels);
                     let texel = self.whole.texel(view, tx, ty);
-                    let part = |v: u8| f64::from(v) / 127.5 - 1.0;
-                    let [mut nx, mut ny] = texel.normal.map(part);
-                    let nz = (1.0 - nx * nx - ny * ny).max(0.0).sqrt();
+                    let [mut nx, mut ny, nz] = normal_parts(texel.normal);
                     for _ in 0..turns {
                         (nx, ny) = (-ny, nx);
                     }
@@ -250,7 +248,7 @@ impl Atlas<'_> {
                         alpha: keyed(texel.color[3], cutoff, self.engine.alpha_cutoff()),
                         normal: [nx, ny, nz],
                         frame,
-                        height: depth_scale * (0.5 - f64::from(texel.depth) / 65535.0),
+                        height: 0.5 * depth_scale * decode_height(texel.depth),
                     };
                     let (ox, oy) = (cell % self.side * texels, cell / self.side * texels);
                     image.put_pixel(ox + x, oy + y, Rgba(pixel(&shown)));

@@ -9,7 +9,7 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, SmallVec, WritableImage,
 };
 use forest_soup::srgb8_to_linear;
-use forest_views::{Channel, Layout, Quality, ViewsBlock, decode_normal, encode};
+use forest_views::{Channel, Layout, Quality, ViewsBlock, decode_height, decode_normal, encode};
 use image::{ImageBuffer, Luma, Rgb, RgbImage, RgbaImage};
 use serde_json::json;
 use std::io::Cursor;
@@ -166,7 +166,7 @@ fn exr_file(block: &ViewsBlock, name: &str) -> Result<ExportFile, ExportError> {
                 values.extend(n.to_array().map(|v| v as f32));
             }
             if h.channels.depth {
-                let depth = h.radius * (2.0 * f64::from(t.depth) / 65535.0 - 1.0);
+                let depth = -h.radius * decode_height(t.depth);
                 values.push(if a > 0 { depth as f32 } else { f32::INFINITY });
             }
             if h.channels.sky {
