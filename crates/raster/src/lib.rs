@@ -14,10 +14,11 @@
 //! transparent covers a sample by the hash rule ([`covers`]); nothing is blended or sorted.
 //!
 //! [`CaptureScene`] takes many parallel views of one soup, fast and with less care for single
-//! samples: what view atlases are baked from.
+//! samples: what view atlases are baked from. [`layers()`] finds what rays meet behind the first
+//! thing too.
 //!
 //! Renderers of other things (points, views) fill a [`DisplayList`] and [`draw`] it, so that
-//! there is one canvas.
+//! there is one canvas. What must be blended is sorted and [`composite()`]d.
 //!
 //! ```
 //! use forest_raster::{RayScene, Style, Surfaces, rasterize};
@@ -43,6 +44,8 @@
 
 mod canvas;
 mod capture;
+mod composite;
+mod layers;
 mod light;
 mod list;
 mod mesh;
@@ -56,6 +59,8 @@ mod surface;
 
 pub use canvas::{Style, draw};
 pub use capture::{Buffers, Capture, CaptureScene, Skylight, Subject};
+pub use composite::{Layer, composite};
+pub use layers::{LayerHit, layers};
 pub use light::{Light, Sun};
 pub use list::{Corner, DisplayList, Ellipse, Projector};
 pub use mesh::rasterize;

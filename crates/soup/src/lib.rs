@@ -3,7 +3,7 @@
 //! A [`Model`] is what a file holds (meshes and the places they stand in); [`Model::flatten`]
 //! turns it into one [`TriangleSoup`]: an `f64` origin, `f32` positions about it, materials and
 //! textures. No topology is assumed. [`Camera`] is the common way to say where a picture is taken
-//! from, and [`ShadedTexture`] is a texture as light sees it: linear, premultiplied, with the
+//! from, [`Photograph`] is one with its camera, and [`ShadedTexture`] is a texture as light sees it: linear, premultiplied, with the
 //! material's alpha rule applied.
 //!
 //! ```
@@ -33,6 +33,7 @@ mod color;
 mod coverage;
 mod material;
 mod model;
+mod photograph;
 mod placement;
 mod shaded;
 mod soup;
@@ -43,6 +44,7 @@ pub use color::{linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
 pub use coverage::CoverageMap;
 pub use material::{AlphaMode, Material};
 pub use model::{FlattenError, Instance, Mesh, Model};
+pub use photograph::{Distortion, Optics, PhotoCamera, Photograph};
 pub use placement::Placement;
 pub use shaded::ShadedTexture;
 pub use soup::{Bounds, InvalidSoup, TriangleSoup};
