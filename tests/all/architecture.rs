@@ -22,6 +22,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-import", &["forest-soup"]),
     ("forest-points", &["forest-soup", "forest-pack"]),
     ("forest-raster", &["forest-soup"]),
+    ("forest-vq", &[]),
     ("forest-views", &["forest-soup", "forest-raster", "forest-pack"]),
     ("forest-export", &["forest-soup", "forest-pack", "forest-views"]),
     (
@@ -67,6 +68,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-views",
             "forest-export",
             "forest-sample-data",
+            "forest-vq",
         ],
     ),
 ];
