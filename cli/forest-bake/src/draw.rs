@@ -4,13 +4,14 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use anyhow::{Context, Result, bail};
-use forest_draw::{ViewsLevel, draw_points, read_surfaces};
+use forest_draw::{Blending, ViewsLevel, VolumeScene, draw_points, read_surfaces};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
 use forest_raster::{Picture, Sampling, Style};
 use forest_soup::{Camera, Projection};
 use forest_views::{Lookup, ViewsBlock, select};
+use forest_volume::{Detail, VolumeBlock};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
 use std::io::Cursor;
@@ -58,7 +59,13 @@ pub(crate) struct Args {
     /// How views are looked up; several give pictures side by side.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "depth")]
     lookup: Vec<LookupArg>,
-    /// Largest width of a view's texel in pixels: what chooses the level of views.
+    /// Levels of a volume, 0 is the root; several give pictures side by side. Default: by --texel.
+    #[arg(long, value_delimiter = ',', value_name = "N")]
+    level: Vec<u32>,
+    /// How the billboards of a volume's two nearest cameras make one.
+    #[arg(long, value_enum, default_value = "shares")]
+    blend: BlendArg,
+    /// Largest width of a texel in pixels: what chooses the level of views, and cells of a volume.
     #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive_wide)]
     texel: f64,
     /// Light, without shadows.
@@ -78,6 +85,16 @@ enum Representation {
     Points,
     /// Views.
     Views,
+    /// Billboards of an octree, in the light of their photographs.
+    Volume,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum BlendArg {
+    /// Their mean; what one does not know is the other's.
+    Shares,
+    /// One over the other: the paper's way.
+    Over,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -123,14 +140,18 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let pack = Pack::open(&args.pack)?;
     let style =
         Style { sampling: Sampling { side: args.samples, seed: 1 }, light: args.light.light() };
-    let what = args.what.unwrap_or(if PointsBlock::is_in(&pack) || !ViewsBlock::is_in(&pack) {
-        Representation::Points
-    } else {
-        Representation::Views
-    });
+    let found = match [ViewsBlock::is_in(&pack), VolumeBlock::is_in(&pack)] {
+        _ if PointsBlock::is_in(&pack) => Representation::Points,
+        [true, _] => Representation::Views,
+        [false, true] => Representation::Volume,
+        // Says what is missing.
+        [false, false] => Representation::Points,
+    };
+    let what = args.what.unwrap_or(found);
     let pictures = match what {
         Representation::Points => draw_all_points(args, &pack, &style, quiet)?,
         Representation::Views => draw_all_views(args, &pack, &style, quiet)?,
+        Representation::Volume => draw_all_volumes(args, &pack, &style, quiet)?,
     };
     write(args, &pictures)
 }
@@ -177,6 +198,44 @@ fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resul
                 block.directions().count(),
                 level.side(),
                 output::bytes(drawn.bytes),
+                picture.mean_coverage()
+            );
+        }
+        pictures.push(picture);
+    }
+    Ok(pictures)
+}
+
+fn draw_all_volumes(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+    if args.error.is_some() || args.budget.is_some() {
+        let rule =
+            "--error and --budget choose levels of points; --level and --texel those of a volume";
+        bail!(Usage(rule.into()));
+    }
+    let block = VolumeBlock::open(pack)?;
+    let camera = args.camera(block.header.bounds.map(DVec3::from_array))?;
+    let finest = block.header.levels.len() as u32 - 1;
+    if let Some(level) = args.level.iter().find(|l| **l > finest) {
+        bail!(Usage(format!("--level {level}: the finest level of the pack is {finest}")));
+    }
+    let scene = VolumeScene::read(&block)?;
+    let blending = match args.blend {
+        BlendArg::Shares => Blending::Shares,
+        BlendArg::Over => Blending::Over,
+    };
+    let mut details: Vec<Detail> = args.level.iter().map(|l| Detail::Level(*l)).collect();
+    if details.is_empty() {
+        details.push(Detail::Planes { texel: args.texel, fade: Detail::FADE });
+    }
+    let mut pictures = Vec::new();
+    for detail in details {
+        let (picture, drawn) = scene.draw(&camera, detail, blending, style.sampling);
+        if !quiet {
+            eprintln!(
+                "{} cells, {} billboards, {}, coverage {:.4}",
+                output::count(drawn.cells),
+                output::count(drawn.billboards),
+                output::bytes(drawn.bytes as u64),
                 picture.mean_coverage()
             );
         }

@@ -5,11 +5,11 @@ use crate::light::LightArg;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource};
 use anyhow::{Context, Result};
-use forest_draw::{ViewsLevel, read_surfaces};
+use forest_draw::{ViewsLevel, VolumeScene, read_surfaces};
 use forest_eval::report::{self, Axis};
 use forest_eval::{
     Baselines, Contender, Evaluation, Metric, Plan, Subject, Sweep, Truth, calibrate, machine,
-    measures, own_contenders, pictures, sweep, views_contenders,
+    measures, own_contenders, pictures, sweep, views_contenders, volume_contenders,
 };
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
@@ -18,6 +18,7 @@ use forest_points::{Calibration, PointsBlock};
 use forest_raster::{Sampling, Style, Surfaces};
 use forest_soup::TriangleSoup;
 use forest_views::ViewsBlock;
+use forest_volume::VolumeBlock;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -89,7 +90,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     refuse_other_source(&pack, &source)?;
     let points = if PointsBlock::is_in(&pack) { Some(PointsBlock::open(&pack)?) } else { None };
     let views = if ViewsBlock::is_in(&pack) { Some(ViewsBlock::open(&pack)?) } else { None };
-    if points.is_none() && views.is_none() {
+    let volume = if VolumeBlock::is_in(&pack) { Some(VolumeBlock::open(&pack)?) } else { None };
+    if points.is_none() && views.is_none() && volume.is_none() {
         // Says what is missing.
         PointsBlock::open(&pack)?;
     }
@@ -110,6 +112,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     };
     let levels = views.as_ref().map(|v| all_levels(v)).transpose()?.unwrap_or_default();
     contenders.extend(views_contenders(&levels));
+    let scene = volume.as_ref().map(VolumeScene::read).transpose()?;
+    contenders.extend(volume_contenders(scene.as_ref()));
     let found = judge.sweep(&truth, &contenders)?;
     let exhibits = match args.html {
         Some(_) => report::gallery(&truth, &contenders, &plan, &found)?,

@@ -7,6 +7,7 @@ use forest_pack::PackError;
 use forest_points::BakeError;
 use forest_soup::FlattenError;
 use forest_views::ViewsError;
+use forest_volume::VolumeError;
 use std::process::ExitCode;
 
 /// Wrong usage.
@@ -57,6 +58,14 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
             _ => 4,
         });
     }
+    if let Some(e) = cause.downcast_ref::<VolumeError>() {
+        return Some(match e {
+            VolumeError::Options(_) => 1,
+            VolumeError::Pack(e) => pack(e),
+            VolumeError::Soup(_) | VolumeError::NothingToSee(_) | VolumeError::Inconsistent(_) => 3,
+            _ => 4,
+        });
+    }
     if let Some(e) = cause.downcast_ref::<ExportError>() {
         return Some(match e {
             ExportError::Pack(e) => pack(e),
@@ -68,6 +77,7 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
         return Some(match e {
             EvalError::Plan { .. } => 1,
             EvalError::Temporary(_) => 2,
+            EvalError::Lens(_) => 5,
             EvalError::Pack(e) => pack(e),
             EvalError::Bake(e) => bake(e),
             EvalError::Soup(_) | EvalError::NothingToSee | EvalError::Unseen { .. } => 3,

@@ -1,5 +1,7 @@
 //! `forest-bake inspect`.
 
+mod volume;
+
 use crate::output;
 use anyhow::Result;
 use forest_pack::header::{self, Meta};
@@ -7,11 +9,13 @@ use forest_pack::measures::{Measure, Measures};
 use forest_pack::{Codec, Pack, SectionId, kind};
 use forest_points::{BakeCounts, PointsBlock};
 use forest_views::{Channel, Dome, Layout, LevelHeader, Lookup, Quality, ViewsBlock};
+use forest_volume::VolumeBlock;
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
+use volume::VolumeReport;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -34,6 +38,7 @@ struct Report {
     sections: Vec<SectionReport>,
     points: Option<PointsReport>,
     views: Option<ViewsReport>,
+    volume: Option<VolumeReport>,
     measures: Option<Measures>,
 }
 
@@ -205,6 +210,11 @@ impl Report {
             } else {
                 None
             },
+            volume: if VolumeBlock::is_in(pack) {
+                Some(VolumeReport::of(&VolumeBlock::open(pack)?))
+            } else {
+                None
+            },
             measures: Measures::read(pack)?,
         })
     }
@@ -227,6 +237,9 @@ impl Report {
             p.text(&mut t)?;
         }
         if let Some(v) = &self.views {
+            v.text(&mut t)?;
+        }
+        if let Some(v) = &self.volume {
             v.text(&mut t)?;
         }
         if let Some(m) = &self.measures {
@@ -269,6 +282,7 @@ fn measures_text(m: &Measures, t: &mut String) -> std::fmt::Result {
                 let lookup = Lookup::ALL.get(second as usize).map_or("?", |l| l.name());
                 (format!("{first}² {lookup}"), String::new())
             }
+            kind::VOLUME_HEADER => (format!("level {first}"), String::new()),
             _ => (format!("s_m {first}"), third.to_string()),
         };
         let mean =

@@ -1,5 +1,6 @@
 //! `forest-bake`: tree models in, LOD packs out. One file a subcommand; no algorithm here.
 
+mod capture;
 mod draw;
 mod eval;
 mod export;
@@ -13,11 +14,12 @@ mod source;
 mod target;
 mod verify;
 mod views;
+mod volume;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Bakes tree models (glTF, OBJ) into LOD packs.
+/// Bakes tree models (glTF, OBJ) and photographs of trees into LOD packs.
 ///
 /// Exit codes: 0 ok, 1 wrong usage, 2 input or output failed, 3 invalid input, 4 failed while
 /// working, 5 the input needs something that is not supported.
@@ -40,6 +42,10 @@ enum Command {
     Points(points::Args),
     /// Bake views: pictures from many directions, in an atlas.
     Views(views::Args),
+    /// Bake a volume: an octree of small billboards, from a mesh or from photographs.
+    Volume(volume::Args),
+    /// Photograph a tree from all around: RGBA images and a transforms.json.
+    Capture(capture::Args),
     /// Write views as textures for engines: PNG, EXR, KTX2.
     Export(export::Args),
     /// Draw a picture of a pack, at one or several levels of detail.
@@ -81,6 +87,8 @@ fn run(args: Args) -> anyhow::Result<()> {
     match args.command {
         Command::Points(a) => points::run(&a, quiet),
         Command::Views(a) => views::run(&a, quiet),
+        Command::Volume(a) => volume::run(&a, quiet),
+        Command::Capture(a) => capture::run(&a, quiet),
         Command::Export(a) => export::run(&a, quiet),
         Command::Draw(a) => draw::run(&a, quiet),
         Command::Eval(a) => eval::run(&a, quiet),

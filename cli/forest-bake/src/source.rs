@@ -46,12 +46,16 @@ impl SourceArgs {
 }
 
 impl ImportArgs {
+    /// What files may claim.
+    pub(crate) fn limits(&self) -> Limits {
+        Limits { allow_outside: self.allow_outside, ..Limits::default() }
+    }
+
     /// Reads and flattens `trees`; warnings go to stderr.
     pub(crate) fn load(&self, trees: &[String], quiet: bool) -> Result<LoadedSource> {
         let start = Instant::now();
         let block = Block::parse(trees)?;
-        let limits = Limits { allow_outside: self.allow_outside, ..Limits::default() };
-        let loaded = block.load(&limits)?;
+        let loaded = block.load(&self.limits())?;
         if !quiet {
             loaded.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
         }
@@ -65,20 +69,25 @@ impl ImportArgs {
                 placement: part.placement_text(),
             })
             .collect();
-        let mut hasher = blake3::Hasher::new();
-        for s in &sources {
-            hasher.update(&s.hash);
-            hasher.update(&(s.placement.len() as u64).to_le_bytes());
-            hasher.update(s.placement.as_bytes());
-        }
-        let meta = Meta {
-            generator: concat!("forest-bake ", env!("CARGO_PKG_VERSION")).into(),
-            source_hash: *hasher.finalize().as_bytes(),
-            sources,
-        };
+        let meta = meta(sources);
         let soup = loaded.model.flatten(self.max_triangles)?;
         let seconds = start.elapsed().as_secs_f64();
         Ok(LoadedSource { soup, meta, trees: block.parts.len(), seconds })
+    }
+}
+
+/// What a pack says of where it comes from.
+pub(crate) fn meta(sources: Vec<Source>) -> Meta {
+    let mut hasher = blake3::Hasher::new();
+    for s in &sources {
+        hasher.update(&s.hash);
+        hasher.update(&(s.placement.len() as u64).to_le_bytes());
+        hasher.update(s.placement.as_bytes());
+    }
+    Meta {
+        generator: concat!("forest-bake ", env!("CARGO_PKG_VERSION")).into(),
+        source_hash: *hasher.finalize().as_bytes(),
+        sources,
     }
 }
 

@@ -7,6 +7,7 @@ use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, SectionId, kind};
 use forest_points::{PointsBlock, read_materials};
 use forest_views::ViewsBlock;
+use forest_volume::VolumeBlock;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -38,6 +39,9 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
     Measures::read(&pack)?;
     if ViewsBlock::is_in(&pack) {
         ViewsBlock::open(&pack)?;
+    }
+    if VolumeBlock::is_in(&pack) {
+        VolumeBlock::open(&pack)?.texels()?;
     }
     if !PointsBlock::is_in(&pack) {
         return Ok(());

@@ -2,7 +2,7 @@
 
 use crate::contender::{Contender, Look, Way};
 use crate::error::EvalError;
-use forest_draw::ViewsLevel;
+use forest_draw::{ViewsLevel, VolumeScene};
 use forest_pack::{Pack, PackWriter};
 use forest_points::{BakeOptions, GridChoice, Order, PointsBlock, RadiusRule, SurfelSize, bake};
 use forest_raster::Surfaces;
@@ -175,6 +175,16 @@ pub fn views_contenders<'a>(levels: &'a [ViewsLevel<'a>]) -> Vec<Contender<'a>> 
         Contender { name, what, way: Way::Views { levels, lookup } }
     })
     .collect()
+}
+
+/// A pack's volume, level by level.
+pub fn volume_contenders<'a>(scene: Option<&'a VolumeScene<'a>>) -> Vec<Contender<'a>> {
+    let named = |scene| Contender {
+        name: "volume",
+        what: "the volume, one level of it, two cameras blended",
+        way: Way::Volume { scene },
+    };
+    scene.map(named).into_iter().collect()
 }
 
 fn baked(soup: &TriangleSoup, options: &BakeOptions) -> Result<Pack, EvalError> {

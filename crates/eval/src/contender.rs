@@ -1,10 +1,11 @@
 //! What is judged: the pack, and other ways to draw the same tree with fewer primitives.
 
-use forest_draw::{ViewsLevel, point_ellipses};
+use forest_draw::{Blending, ViewsLevel, VolumeScene, point_ellipses};
 use forest_points::{Cut, PixelArea, PointsBlock, Thresholds, select_into};
 use forest_raster::{DisplayList, Ellipse, Picture, Style, Surfaces, draw, rasterize};
 use forest_soup::{Camera, TriangleSoup};
 use forest_views::Lookup;
+use forest_volume::Detail;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -34,6 +35,8 @@ pub(crate) enum Way<'a> {
     RandomPoints { block: &'a PointsBlock<'a> },
     /// Views, level by level, looked up in one way.
     Views { levels: &'a [ViewsLevel<'a>], lookup: Lookup },
+    /// A volume, level by level.
+    Volume { scene: &'a VolumeScene<'a> },
     /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
     Meshes { levels: &'a [(f64, Cow<'a, TriangleSoup>)], surfaces: &'a Surfaces },
 }
@@ -68,6 +71,11 @@ pub enum Knob {
         texels: u32,
         /// How views are looked up.
         lookup: ViewsLookup,
+    },
+    /// A level of a volume.
+    Volume {
+        /// Its number; 0 is the root.
+        level: u32,
     },
 }
 
@@ -114,7 +122,7 @@ impl Knob {
                 largest: PixelArea(s_max),
                 depth_bias: PixelArea(k),
             }),
-            Knob::Share(_) | Knob::Views { .. } => None,
+            Knob::Share(_) | Knob::Views { .. } | Knob::Volume { .. } => None,
         }
     }
 }
@@ -122,7 +130,7 @@ impl Knob {
 /// What a picture cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Cost {
-    /// Points, triangles and views drawn.
+    /// Points, triangles, views and billboards drawn.
     pub primitives: f64,
     /// Bytes of records that a renderer looks at to draw them.
     pub bytes: f64,
@@ -154,6 +162,10 @@ impl Contender<'_> {
                 .iter()
                 .map(|l| Knob::Views { texels: l.side(), lookup: (*lookup).into() })
                 .collect(),
+            Way::Volume { scene } => {
+                let levels = scene.block().header.levels.len() as u32;
+                (0..levels).rev().map(|level| Knob::Volume { level }).collect()
+            }
             Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),
             Way::Meshes { levels, .. } => levels.iter().map(|l| Knob::Share(l.0)).collect(),
         }
@@ -188,6 +200,12 @@ impl Contender<'_> {
                 let level = levels.iter().find(|l| l.side() == texels).expect("a level");
                 let (picture, drawn) = level.draw(camera, *lookup, style);
                 let (primitives, bytes) = (drawn.views as f64, drawn.bytes as f64);
+                (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
+            }
+            (Way::Volume { scene }, Knob::Volume { level }) => {
+                let detail = Detail::Level(level);
+                let (picture, drawn) = scene.draw(camera, detail, Blending::Shares, style.sampling);
+                let (primitives, bytes) = (drawn.billboards as f64, drawn.bytes);
                 (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
             }
             _ => unreachable!("a contender is drawn with its own knobs"),

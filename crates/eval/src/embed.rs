@@ -37,7 +37,9 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
 
 /// Whether a contender draws what is in the pack as it is.
 pub(crate) fn is_own(name: &str) -> bool {
-    ["pack", "triangles", "bias-1/4", "bias-1"].contains(&name) || name.starts_with("views")
+    ["pack", "triangles", "bias-1/4", "bias-1"].contains(&name)
+        || name.starts_with("views")
+        || name == "volume"
 }
 
 fn measure(s: &Summary, band: Band, plan: &Plan) -> Option<Measure> {
@@ -46,6 +48,7 @@ fn measure(s: &Summary, band: Band, plan: &Plan) -> Option<Measure> {
         Knob::Views { texels, lookup } => {
             (kind::VIEWS_HEADER, [texels as f32, f32::from(lookup as u8), 0.0])
         }
+        Knob::Volume { level } => (kind::VOLUME_HEADER, [level as f32, 0.0, 0.0]),
         Knob::Share(_) => return None,
     };
     Some(Measure {

@@ -41,6 +41,9 @@ pub enum EvalError {
         /// What it may be.
         rule: &'static str,
     },
+    /// A photograph's camera cannot be drawn from.
+    #[error("{0}: its lens, pixels or centre are not those of a plain camera: it cannot judge")]
+    Lens(String),
     /// The report could not be made.
     #[error("cannot make the report: {0}")]
     Report(String),

@@ -57,7 +57,8 @@ pub fn composite<L: Layer>(layers: &[L], camera: &Camera, sampling: Sampling) ->
         .map(|(b, bin)| {
             let top = b as u32 * rows;
             let size = [camera.width, rows.min(camera.height - top)];
-            let mut samples = vec![Sample::NONE; size[0] as usize * size[1] as usize * pattern.count()];
+            let mut samples =
+                vec![Sample::NONE; size[0] as usize * size[1] as usize * pattern.count()];
             for i in bin {
                 put(&layers[i as usize], &pattern, top, size, &mut samples);
             }

@@ -137,6 +137,29 @@ impl PhotoCamera {
         }
     }
 
+    /// The same camera without a lens; `None` if it has one, or pixels that are not square, or an
+    /// axis that does not meet the picture's middle (within half a pixel).
+    pub fn plain(&self) -> Option<Camera> {
+        let [width, height] = self.size;
+        let projection = match self.optics {
+            Optics::Parallel { pixel } => {
+                Projection::Orthographic { height: f64::from(height) * pixel }
+            }
+            Optics::Pinhole { focal: [fx, fy], center, distortion } => {
+                let off = [(center[0], width), (center[1], height)]
+                    .map(|(c, n)| (c - 0.5 * f64::from(n)).abs());
+                let square = (fx / fy - 1.0).abs() * f64::from(width) <= 1.0;
+                if distortion != Distortion::default() || !square || off.iter().any(|o| *o > 0.5) {
+                    return None;
+                }
+                let fov_y = 2.0 * (0.5 * f64::from(height) / fy).atan();
+                Projection::Perspective { fov_y }
+            }
+        };
+        let Self { eye, right, up, forward, .. } = *self;
+        Some(Camera { eye, right, up, forward, projection, width, height })
+    }
+
     /// Unit vector from `world` towards the camera.
     pub fn direction_from(&self, world: DVec3) -> DVec3 {
         match self.optics {
@@ -189,8 +212,7 @@ mod tests {
             projection,
             [640, 480],
         );
-        let optics =
-            Optics::Pinhole { focal: [500.0, 520.0], center: [310.0, 250.0], distortion };
+        let optics = Optics::Pinhole { focal: [500.0, 520.0], center: [310.0, 250.0], distortion };
         PhotoCamera { optics, ..PhotoCamera::from(&c) }
     }
 
@@ -217,6 +239,8 @@ mod tests {
             let (a, b) = (c.project(p), PhotoCamera::from(&c).project(p).unwrap());
             assert!((a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9, "{a:?} {b:?}");
             assert!((a.2 - b.2).abs() < 1e-12);
+            let plain = PhotoCamera::from(&c).plain().unwrap();
+            assert!((plain.project(p).0 - a.0).abs() < 1e-9);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! [`for_engine`] writes the textures and the side file that the impostor shaders of Unreal, Godot
 //! and three.js read; [`plain()`] writes PNG, EXR or KTX2 for any reader; [`contact_sheet`] a sheet for
-//! people. Nothing touches the disk: an export is a list of [`ExportFile`]s.
+//! people; [`photographs()`] a capture for NeRF tools. Nothing touches the disk: an export is a list of [`ExportFile`]s.
 //!
 //! ```
 //! use forest_export::{Engine, for_engine, tiles};
@@ -44,12 +44,14 @@ mod engine;
 mod error;
 mod grid;
 mod ktx2;
+mod photographs;
 mod picture;
 mod plain;
 mod sheet;
 
 pub use engine::{Engine, TileFrame, for_engine, tiles};
 pub use error::ExportError;
+pub use photographs::photographs;
 pub use picture::ExportFile;
 pub use plain::{PlainFormat, plain};
 pub use sheet::contact_sheet;

@@ -1,6 +1,7 @@
-//! Trees from files: glTF 2.0 and Wavefront OBJ, and blocks of several of them.
+//! Trees from files: glTF 2.0 and Wavefront OBJ, blocks of several of them, and photographs.
 //!
-//! [`load`] reads one file into a [`forest_soup::Model`]; [`Block`] places several. What a file
+//! [`load`] reads one file into a [`forest_soup::Model`]; [`Block`] places several;
+//! [`load_photographs`] reads photographs with calibrated cameras. What a file
 //! needs and this crate does not know is [`ImportError::Unsupported`], naming it; a file that
 //! breaks its format's rules is [`ImportError::Invalid`], with element, value and limit. Nothing
 //! outside a file's own folder is read unless [`Limits::allow_outside`] says so.
@@ -22,11 +23,13 @@ mod block;
 mod error;
 mod gltf;
 mod obj;
+mod photographs;
 mod picture;
 mod source;
 
 pub use block::{Block, LoadedBlock, Part};
 pub use error::ImportError;
+pub use photographs::{CaptureSet, Up, load_photographs, transforms_file};
 pub use source::Limits;
 
 use forest_soup::Model;

@@ -34,6 +34,21 @@ pub const VIEWS_DEPTH: u16 = 52;
 /// Share of the sky that is seen, of a level's pages.
 pub const VIEWS_SKY: u16 = 53;
 
+/// Header of the volume representation (owner: `forest-volume`).
+pub const VOLUME_HEADER: u16 = 64;
+/// Nodes of a level, 20 bytes each; the index is the level's number.
+pub const VOLUME_NODES: u16 = 65;
+/// Of each node of a level, the cameras for which it has billboards.
+pub const VOLUME_CAMERAS: u16 = 66;
+/// Texels of a level's billboards, if there are no codebooks.
+pub const VOLUME_TEXELS: u16 = 67;
+/// Numbers of the colour codewords of a level's billboards.
+pub const VOLUME_COLORS: u16 = 68;
+/// Numbers of the alpha codewords of a level's billboards.
+pub const VOLUME_ALPHAS: u16 = 69;
+/// The atlas of codewords.
+pub const VOLUME_ATLAS: u16 = 70;
+
 /// Name of a kind for people; unknown kinds are named by number.
 pub fn name(kind: u16) -> String {
     match kind {
@@ -53,6 +68,13 @@ pub fn name(kind: u16) -> String {
         VIEWS_NORMAL => "views.normal".into(),
         VIEWS_DEPTH => "views.depth".into(),
         VIEWS_SKY => "views.sky".into(),
+        VOLUME_HEADER => "volume.header".into(),
+        VOLUME_NODES => "volume.nodes".into(),
+        VOLUME_CAMERAS => "volume.cameras".into(),
+        VOLUME_TEXELS => "volume.texels".into(),
+        VOLUME_COLORS => "volume.colors".into(),
+        VOLUME_ALPHAS => "volume.alphas".into(),
+        VOLUME_ATLAS => "volume.atlas".into(),
         other => format!("kind-{other}"),
     }
 }

@@ -1,0 +1,324 @@
+//! The textures of cells, as one camera sees them.
+//!
+//! Each ray of a photograph is followed through the cells of a level. What it shows is shared
+//! among them: with a known depth it all goes to the cell at that depth; else to each cell as much
+//! as its opacity lets it stop, all of them made denser or thinner together until they stop what
+//! the matte says (the rule of section 2.1 of paper 004, "the input images, the depth of the cell
+//! in the tree and the alpha/opacity values", made to add up). A texel's alpha is then what the
+//! cell stopped of the light that *reached* it, so that billboards one over the other give the
+//! photograph again.
+
+use crate::cells::Cells;
+use crate::frame::CameraFrame;
+use crate::lattice::Lattice;
+use crate::march::{LocalRay, walk};
+use crate::options::{Coarse, VolumeOptions};
+use forest_soup::{PhotoCamera, Photograph, linear_to_srgb8, srgb8_to_linear};
+use glam::DVec3;
+use std::time::{Duration, Instant};
+
+/// One camera's billboards of one level.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct LevelBillboards {
+    /// Numbers of the cells that have one, ascending.
+    pub(crate) cells: Vec<u32>,
+    /// sRGB and alpha, `texels²` a billboard, row 0 on top.
+    pub(crate) texels: Vec<[u8; 4]>,
+    /// Numbers of the cells that are hidden from the camera, ascending.
+    pub(crate) hidden: Vec<u32>,
+    /// Cells that show nothing though they are not hidden.
+    pub(crate) blank: u64,
+}
+
+/// One camera's billboards, and the time that the finest level and the others took.
+pub(crate) struct CameraBillboards {
+    pub(crate) levels: Vec<LevelBillboards>,
+    pub(crate) finest: Duration,
+    pub(crate) coarser: Duration,
+}
+
+/// What rays found at a texel.
+#[derive(Clone, Copy, Default)]
+struct Found {
+    /// Light that reached the cell there, in rays.
+    reach: f32,
+    /// Of that, what the cell stopped.
+    stopped: f32,
+    /// Linear RGB of what it stopped.
+    rgb: [f32; 3],
+}
+
+/// Weight, in rays, of the cell's mean opacity beside what rays found at a texel.
+const PRIOR: f32 = 0.05;
+
+/// Rays along the side of a texel of coarser levels.
+const RAYS_A_TEXEL: f64 = 4.0;
+
+/// Light that is not followed any more.
+const DARK: f32 = 1.0 / 256.0;
+
+/// Alpha above which a matte is opaque: what is behind it is unknown.
+const OPAQUE: f32 = 1.0 - 1.0 / 512.0;
+
+/// All levels of one camera.
+pub(crate) fn billboards(
+    lattice: &Lattice,
+    levels: &[Cells],
+    photo: &Photograph,
+    frame: &CameraFrame,
+    options: &VolumeOptions,
+) -> CameraBillboards {
+    let start = Instant::now();
+    let camera = Rays { lattice, photo, frame, options, shares: frame.silhouette(options.texels) };
+    let mut out = vec![camera.level(lattice.levels, &levels[lattice.levels as usize])];
+    let finest = start.elapsed();
+    let start = Instant::now();
+    for level in (0..lattice.levels).rev() {
+        let cells = &levels[level as usize];
+        let billboards = match options.coarse {
+            Coarse::Photographs => camera.level(level, cells),
+            Coarse::Below => {
+                let below = out.last().expect("the level below");
+                crate::below::average(lattice, cells, below, frame, options.texels)
+            }
+        };
+        out.push(billboards);
+    }
+    out.reverse();
+    prune_children(levels, &mut out, options.texels);
+    CameraBillboards { levels: out, finest, coarser: start.elapsed() }
+}
+
+/// A photograph's rays.
+struct Rays<'a> {
+    lattice: &'a Lattice,
+    photo: &'a Photograph,
+    frame: &'a CameraFrame,
+    options: &'a VolumeOptions,
+    /// Of each texel, the share that a cell's picture covers.
+    shares: Vec<f64>,
+}
+
+/// Finds the texel of a billboard that a ray meets.
+struct TexelFinder {
+    right: DVec3,
+    up: DVec3,
+    back: DVec3,
+    /// Texels a cell side, over the half size: across and down.
+    scale: [f64; 2],
+    texels: u32,
+}
+
+impl TexelFinder {
+    fn new(frame: &CameraFrame, texels: u32) -> Self {
+        let [right, up, back] = frame.axes();
+        let scale = frame.half_size(1.0).map(|h| 0.5 * f64::from(texels) / h);
+        Self { right, up, back, scale, texels }
+    }
+
+    /// The texel where `ray` crosses the plane of the billboard about `center`, in cells; the
+    /// nearest one where it passes by.
+    #[inline]
+    fn texel(&self, ray: &LocalRay, center: DVec3) -> usize {
+        let to = center - ray.origin;
+        let along = ray.direction.dot(self.back);
+        let t = if along.abs() > 0.05 { to.dot(self.back) / along } else { to.dot(ray.direction) };
+        let off = ray.direction * t - to;
+        let half = f64::from(self.texels) * 0.5;
+        // `as` saturates below at 0.
+        let x = ((half + off.dot(self.right) * self.scale[0]) as u32).min(self.texels - 1);
+        let y = ((half - off.dot(self.up) * self.scale[1]) as u32).min(self.texels - 1);
+        (y * self.texels + x) as usize
+    }
+}
+
+impl Rays<'_> {
+    fn level(&self, level: u32, cells: &Cells) -> LevelBillboards {
+        let t2 = (self.options.texels * self.options.texels) as usize;
+        let mut found = vec![Found::default(); cells.places.len() * t2];
+        let step = self.step(level);
+        let [columns, rows] = self.photo.camera.size.map(|n| (f64::from(n) / step) as u32);
+        let finder = TexelFinder::new(self.frame, self.options.texels);
+        let mut met: Vec<(u32, f32)> = Vec::new();
+        for (row, column) in (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c))) {
+            let [x, y] = [column, row].map(|i| (f64::from(i) + 0.5) * step);
+            let Some(ray) = self.local_ray(level, x, y) else { continue };
+            let pixel = y as usize * self.photo.camera.size[0] as usize + x as usize;
+            let [r, g, b, a] = self.photo.pixels[pixel];
+            let shown = Shown { rgb: [r, g, b].map(srgb8_to_linear), alpha: f32::from(a) / 255.0 };
+            let texel = |cell: u32| {
+                let center = cells.places[cell as usize].as_dvec3() + 0.5;
+                cell as usize * t2 + finder.texel(&ray, center)
+            };
+            if self.photo.depth.is_empty() {
+                met.clear();
+                walk(cells, &ray, 0.0, |cell, enter, leave| {
+                    let opacity = cells.opacity[cell as usize].min(OPAQUE);
+                    met.push((cell, -(1.0 - opacity).ln() * (leave - enter) as f32));
+                    true
+                });
+                shown.share(&met, &mut |cell, light, stopped| {
+                    let to = &mut found[texel(cell)];
+                    to.reach += light;
+                    to.stop(stopped, shown.rgb);
+                });
+            } else {
+                let depth = f64::from(self.photo.depth[pixel]);
+                let far = depth / ray.direction.dot(self.photo.camera.forward);
+                let hit = far / self.lattice.cell_side(level);
+                walk(cells, &ray, 0.0, |cell, _, leave| {
+                    let to = &mut found[texel(cell)];
+                    to.reach += 1.0;
+                    if hit < leave {
+                        to.stop(shown.alpha, shown.rgb);
+                    }
+                    hit >= leave
+                });
+            }
+        }
+        self.finish(level, cells, step, &found)
+    }
+
+    /// Pixels between rays: as many rays as texels of the level need.
+    fn step(&self, level: u32) -> f64 {
+        let texel = self.lattice.cell_side(level) / f64::from(self.options.texels);
+        let camera = &self.photo.camera;
+        let depth = (self.lattice.middle() - camera.eye).dot(camera.forward);
+        let pixels = texel * camera.pixels_per_area(depth.max(0.1 * self.lattice.side)).sqrt();
+        let rays = if level == self.lattice.levels { 1.5 } else { RAYS_A_TEXEL };
+        // Pictures are neither enlarged more than fourfold nor walked in less than 16 rays.
+        let least = f64::from(camera.size[0].min(camera.size[1])) / 16.0;
+        // Whole pixels keep rays in the middle of pixels.
+        let step = pixels / rays;
+        let step = if step >= 0.99 { (step + 0.01).floor() } else { step.max(0.25) };
+        step.min(least.max(0.25))
+    }
+
+    /// The ray in cells of a level; `None` where the lens shows nothing.
+    fn local_ray(&self, level: u32, x: f64, y: f64) -> Option<LocalRay> {
+        let (origin, direction) = self.photo.camera.ray(x, y)?;
+        Some(LocalRay { origin: self.lattice.local(level, origin), direction })
+    }
+
+    /// Texels from what rays found; cells that are hidden or show nothing get none.
+    fn finish(&self, level: u32, cells: &Cells, step: f64, found: &[Found]) -> LevelBillboards {
+        let t2 = self.shares.len();
+        let [w, h] = self.frame.half_size(self.lattice.cell_side(level));
+        let texel_area = 4.0 * w * h / t2 as f64;
+        let all: f64 = self.shares.iter().sum();
+        let mut out = LevelBillboards::default();
+        for (i, found) in found.chunks_exact(t2).enumerate() {
+            let center = self.lattice.center(level, cells.places[i]);
+            let rays = texel_area * ray_density(&self.photo.camera, center) / (step * step);
+            let reach: f32 = found.iter().map(|f| f.reach).sum();
+            if f64::from(reach) < (1.0 - self.options.prune) * rays * all {
+                out.hidden.push(i as u32);
+            } else if found.iter().all(|f| f.stopped == 0.0) {
+                out.blank += 1;
+            } else {
+                out.cells.push(i as u32);
+                let mean = Found::sum(found).color();
+                let texel =
+                    |(f, &share): (&Found, &f64)| f.texel(cells.opacity[i], share as f32, mean);
+                out.texels.extend(found.iter().zip(&self.shares).map(texel));
+            }
+        }
+        out
+    }
+}
+
+/// Pixels that a square world unit about `at` covers.
+fn ray_density(camera: &PhotoCamera, at: DVec3) -> f64 {
+    let depth = (at - camera.eye).dot(camera.forward);
+    camera.pixels_per_area(depth.max(1e-9))
+}
+
+/// What a pixel shows.
+struct Shown {
+    rgb: [f32; 3],
+    alpha: f32,
+}
+
+impl Shown {
+    /// Shares a ray among the cells that it meets, given with their optical depths: `to` is told
+    /// the light that reaches each cell, and that it stops.
+    fn share(&self, met: &[(u32, f32)], to: &mut dyn FnMut(u32, f32, f32)) {
+        let all: f32 = met.iter().map(|m| m.1).sum();
+        let wanted = -(1.0 - self.alpha.min(OPAQUE)).ln();
+        let scale = match self.alpha >= OPAQUE {
+            // At least so much: what is behind an opaque front is unknown.
+            true => (wanted / all).max(1.0),
+            false => wanted / all,
+        };
+        let mut light = 1.0;
+        for &(cell, depth) in met {
+            let stopped = light * (1.0 - (-scale * depth).exp());
+            to(cell, light, stopped);
+            light -= stopped;
+            if light < DARK {
+                break;
+            }
+        }
+    }
+}
+
+impl Found {
+    fn stop(&mut self, light: f32, rgb: [f32; 3]) {
+        self.stopped += light;
+        for (sum, v) in self.rgb.iter_mut().zip(rgb) {
+            *sum += light * v;
+        }
+    }
+
+    fn sum(all: &[Self]) -> Self {
+        let mut sum = Self::default();
+        for f in all {
+            sum.reach += f.reach;
+            sum.stopped += f.stopped;
+            (0..3).for_each(|k| sum.rgb[k] += f.rgb[k]);
+        }
+        sum
+    }
+
+    /// Linear RGB of what was stopped; black for nothing.
+    fn color(&self) -> [f32; 3] {
+        let scale = if self.stopped > 0.0 { 1.0 / self.stopped } else { 0.0 };
+        self.rgb.map(|v| v * scale)
+    }
+
+    /// A texel whose share `inside` lies in the cell's picture. Neighbours' billboards overlap
+    /// outside; light that passes both of them is stopped by the whole when each stops, as
+    /// transmittances multiply, the power of its share.
+    fn texel(&self, opacity: f32, inside: f32, mean: [f32; 3]) -> [u8; 4] {
+        let alpha = ((self.stopped + PRIOR * opacity) / (self.reach + PRIOR)).min(1.0);
+        let shared = 1.0 - (1.0 - alpha).powf(inside);
+        let rgb = if self.stopped > 0.0 { self.color() } else { mean };
+        let [r, g, b] = rgb.map(linear_to_srgb8);
+        [r, g, b, (shared * 255.0).round() as u8]
+    }
+}
+
+/// "The pruning strategy is applied recursively to the entire octree structure" (section 3.2):
+/// what is hidden goes with all that it holds.
+fn prune_children(levels: &[Cells], billboards: &mut [LevelBillboards], texels: u32) {
+    let t2 = (texels * texels) as usize;
+    for level in 1..billboards.len() {
+        let mut hidden = vec![false; levels[level].places.len()];
+        for &cell in &billboards[level - 1].hidden {
+            let (first, mask) = levels[level - 1].children[cell as usize];
+            hidden[first as usize..first as usize + mask.count_ones() as usize].fill(true);
+        }
+        let here = &mut billboards[level];
+        here.hidden.iter().for_each(|&cell| hidden[cell as usize] = true);
+        let old = std::mem::take(here);
+        for (&cell, texels) in old.cells.iter().zip(old.texels.chunks_exact(t2)) {
+            if !hidden[cell as usize] {
+                here.cells.push(cell);
+                here.texels.extend_from_slice(texels);
+            }
+        }
+        here.hidden = (0..).zip(&hidden).filter(|(_, h)| **h).map(|(i, _)| i).collect();
+        here.blank =
+            levels[level].places.len() as u64 - (here.cells.len() + here.hidden.len()) as u64;
+    }
+}
