@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
             let picture = rasterize(soup, &surfaces, &camera, &style);
             bar.inc(1);
             let (name, pixels) = (format!("{i:03}"), picture.straight());
-            Photograph { name, camera: (&camera).into(), pixels, depth: Vec::new() }
+            Photograph { name, camera: (&camera).into(), pixels }
         })
         .collect();
     bar.finish_and_clear();

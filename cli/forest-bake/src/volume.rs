@@ -12,8 +12,8 @@ use forest_pack::{Pack, PackWriter, SectionId, kind};
 use forest_raster::Surfaces;
 use forest_soup::Photograph;
 use forest_volume::{
-    BakeReport, Blank, Branching, Coarse, CodebookOptions, CodebookSize, Coding, Space, Stand,
-    TomographyOptions, Volume, VolumeBlock, VolumeOptions, bake,
+    BakeReport, Blank, Branching, Coarse, CodebookOptions, CodebookSize, Coding, Prune, Space,
+    Stand, TomographyOptions, Volume, VolumeBlock, VolumeOptions, bake,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -47,6 +47,10 @@ pub(crate) struct Args {
     /// keeps all.
     #[arg(long, default_value_t = 0.98, value_name = "SHARE", allow_hyphen_values = true)]
     prune: f64,
+    /// From where a cell must be hidden: from the camera and its neighbours, or from the camera
+    /// alone, as in the paper.
+    #[arg(long, value_enum, default_value = "neighbours")]
+    prune_by: PruneArg,
     /// Where the textures of coarser levels come from.
     #[arg(long, value_enum, default_value = "photographs")]
     coarse: CoarseArg,
@@ -116,6 +120,14 @@ enum BranchingArg {
     Octree,
     /// 3 × 3 × 3, which the paper compares with.
     TriGrid,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum PruneArg {
+    /// The camera alone: viewers beside it see holes.
+    Own,
+    /// The camera and those around it.
+    Neighbours,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -321,6 +333,10 @@ impl Args {
             levels: self.levels.unwrap_or(branching.usual_levels()),
             texels: self.texels,
             prune: self.prune,
+            prune_by: match self.prune_by {
+                PruneArg::Own => Prune::Own,
+                PruneArg::Neighbours => Prune::Neighbours,
+            },
             coarse: match self.coarse {
                 CoarseArg::Photographs => Coarse::Photographs,
                 CoarseArg::Below => Coarse::Below,

@@ -94,7 +94,7 @@ mod tests {
     fn photo(name: &str, pixels: Vec<[u8; 4]>) -> Photograph {
         let projection = Projection::Perspective { fov_y: 1.0 };
         let camera = Camera::new(DVec3::ZERO, -DVec3::Z, projection, [2, 2]);
-        Photograph { name: name.into(), camera: (&camera).into(), pixels, depth: vec![] }
+        Photograph { name: name.into(), camera: (&camera).into(), pixels }
     }
 
     #[test]

@@ -58,7 +58,7 @@ mod sprite;
 mod surface;
 
 pub use canvas::{Style, draw};
-pub use capture::{Buffers, Capture, CaptureScene, Skylight, Subject};
+pub use capture::{Buffers, Capture, CaptureScene, DeepHit, DeepPicture, Skylight, Subject};
 pub use composite::{Layer, composite};
 pub use layers::{LayerHit, layers};
 pub use light::{Light, Sun};

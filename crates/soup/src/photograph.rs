@@ -195,9 +195,6 @@ pub struct Photograph {
     pub camera: PhotoCamera,
     /// sRGB and straight alpha (the matte), row 0 on top.
     pub pixels: Vec<[u8; 4]>,
-    /// Depth of what each pixel shows, along the camera's axis, infinite where it shows nothing;
-    /// empty if it is not known.
-    pub depth: Vec<f32>,
 }
 
 #[cfg(test)]

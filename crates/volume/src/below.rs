@@ -31,7 +31,8 @@ pub(crate) fn average(
     let [right, up, back] = frame.axes();
     let size = frame.half_size(1.0);
     let factor = lattice.branching.factor();
-    let mut out = LevelBillboards::default();
+    let mut out =
+        LevelBillboards { hidden: parents_hidden(cells, &below.hidden), ..Default::default() };
     let mut next = 0;
     for (i, &(first, mask)) in (0..).zip(&cells.children) {
         let mut children = Vec::new();
@@ -53,7 +54,6 @@ pub(crate) fn average(
             cell += 1;
         }
         if children.is_empty() {
-            out.blank += 1;
             continue;
         }
         children.sort_by(|a, b| b.back.total_cmp(&a.back));
@@ -63,6 +63,14 @@ pub(crate) fn average(
         }
     }
     out
+}
+
+/// A cell is hidden if all that it holds is.
+fn parents_hidden(cells: &Cells, below: &[bool]) -> Vec<bool> {
+    let of = |&(first, mask): &(u32, u32)| {
+        below[first as usize..][..mask.count_ones() as usize].iter().all(|h| *h)
+    };
+    cells.children.iter().map(of).collect()
 }
 
 /// One texel: the mean over it of its children, front to back.
@@ -115,10 +123,10 @@ mod tests {
         let below = LevelBillboards {
             cells: vec![0, 1, 2, 3, 5, 6, 7],
             texels: [vec![[0, 255, 0, 255]; 4 * 4], vec![front; 3 * 4]].concat(),
-            ..LevelBillboards::default()
+            hidden: vec![true, false, false, false, false, false, false, false],
         };
         let root = average(&lattice, &levels[0], &below, &frame, 2);
-        assert_eq!(root.cells, [0]);
+        assert_eq!((root.cells, root.hidden), (vec![0], vec![false]));
         // Row 0 is the top, child 4 the lower left.
         let both = [188, 187, 0, 255];
         for (texel, want) in root.texels.iter().zip([both, both, [0, 255, 0, 255], both]) {

@@ -1,19 +1,20 @@
 //! The textures of cells, as one camera sees them.
 //!
 //! Each ray of a photograph is followed through the cells of a level. What it shows is shared
-//! among them: with a known depth it all goes to the cell at that depth; else to each cell as much
-//! as its opacity lets it stop, all of them made denser or thinner together until they stop what
-//! the matte says (the rule of section 2.1 of paper 004, "the input images, the depth of the cell
-//! in the tree and the alpha/opacity values", made to add up). A texel's alpha is then what the
-//! cell stopped of the light that *reached* it, so that billboards one over the other give the
-//! photograph again.
+//! among them: each cell stops as much as its opacity lets it, all of them made denser or thinner
+//! together until they stop what the matte says (the rule of section 2.1 of paper 004, "the input
+//! images, the depth of the cell in the tree and the alpha/opacity values", made to add up). A
+//! texel's alpha is then what the cell stopped of the light that *reached* it, so that billboards
+//! one over the other give the photograph again. Deep pictures of a mesh say what each cell stops.
 
 use crate::cells::Cells;
 use crate::frame::CameraFrame;
 use crate::lattice::Lattice;
 use crate::march::{LocalRay, walk};
 use crate::options::{Coarse, VolumeOptions};
-use forest_soup::{PhotoCamera, Photograph, linear_to_srgb8, srgb8_to_linear};
+use crate::photograph::{Seen, Shot};
+use forest_raster::{DeepHit, DeepPicture};
+use forest_soup::{PhotoCamera, linear_to_srgb8, srgb8_to_linear};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 
@@ -24,10 +25,8 @@ pub(crate) struct LevelBillboards {
     pub(crate) cells: Vec<u32>,
     /// sRGB and alpha, `texels²` a billboard, row 0 on top.
     pub(crate) texels: Vec<[u8; 4]>,
-    /// Numbers of the cells that are hidden from the camera, ascending.
-    pub(crate) hidden: Vec<u32>,
-    /// Cells that show nothing though they are not hidden.
-    pub(crate) blank: u64,
+    /// Of each cell of the level, whether what is before it hides it from the camera.
+    pub(crate) hidden: Vec<bool>,
 }
 
 /// One camera's billboards, and the time that the finest level and the others took.
@@ -40,6 +39,8 @@ pub(crate) struct CameraBillboards {
 /// What rays found at a texel.
 #[derive(Clone, Copy, Default)]
 struct Found {
+    /// Light that comes through what is in front, in rays.
+    light: f32,
     /// Light that reached the cell there, in rays.
     reach: f32,
     /// Of that, what the cell stopped.
@@ -48,13 +49,13 @@ struct Found {
     rgb: [f32; 3],
 }
 
-/// Weight, in rays, of the cell's mean opacity beside what rays found at a texel.
-const PRIOR: f32 = 0.05;
+/// Rays that must reach a texel; what lacks is made up by the cell's mean opacity.
+const LEAST_REACH: f32 = 0.5;
 
 /// Rays along the side of a texel of coarser levels.
 const RAYS_A_TEXEL: f64 = 4.0;
 
-/// Light that is not followed any more.
+/// Light that is not followed any more in a photograph.
 const DARK: f32 = 1.0 / 256.0;
 
 /// Alpha above which a matte is opaque: what is behind it is unknown.
@@ -64,12 +65,12 @@ const OPAQUE: f32 = 1.0 - 1.0 / 512.0;
 pub(crate) fn billboards(
     lattice: &Lattice,
     levels: &[Cells],
-    photo: &Photograph,
+    shot: &Shot,
     frame: &CameraFrame,
     options: &VolumeOptions,
 ) -> CameraBillboards {
     let start = Instant::now();
-    let camera = Rays { lattice, photo, frame, options, shares: frame.silhouette(options.texels) };
+    let camera = Rays { lattice, shot, frame, options, shares: frame.silhouette(options.texels) };
     let mut out = vec![camera.level(lattice.levels, &levels[lattice.levels as usize])];
     let finest = start.elapsed();
     let start = Instant::now();
@@ -85,14 +86,13 @@ pub(crate) fn billboards(
         out.push(billboards);
     }
     out.reverse();
-    prune_children(levels, &mut out, options.texels);
     CameraBillboards { levels: out, finest, coarser: start.elapsed() }
 }
 
 /// A photograph's rays.
 struct Rays<'a> {
     lattice: &'a Lattice,
-    photo: &'a Photograph,
+    shot: &'a Shot<'a>,
     frame: &'a CameraFrame,
     options: &'a VolumeOptions,
     /// Of each texel, the share that a cell's picture covers.
@@ -134,46 +134,55 @@ impl TexelFinder {
 
 impl Rays<'_> {
     fn level(&self, level: u32, cells: &Cells) -> LevelBillboards {
-        let t2 = (self.options.texels * self.options.texels) as usize;
+        let t2 = self.shares.len();
         let mut found = vec![Found::default(); cells.places.len() * t2];
         let step = self.step(level);
-        let [columns, rows] = self.photo.camera.size.map(|n| (f64::from(n) / step) as u32);
+        let camera = &self.shot.camera;
+        let [columns, rows] = camera.size.map(|n| (f64::from(n) / step) as u32);
         let finder = TexelFinder::new(self.frame, self.options.texels);
         let mut met: Vec<(u32, f32)> = Vec::new();
         for (row, column) in (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c))) {
             let [x, y] = [column, row].map(|i| (f64::from(i) + 0.5) * step);
-            let Some(ray) = self.local_ray(level, x, y) else { continue };
-            let pixel = y as usize * self.photo.camera.size[0] as usize + x as usize;
-            let [r, g, b, a] = self.photo.pixels[pixel];
-            let shown = Shown { rgb: [r, g, b].map(srgb8_to_linear), alpha: f32::from(a) / 255.0 };
+            let Some((origin, direction)) = camera.ray(x, y) else { continue };
+            let ray = LocalRay { origin: self.lattice.local(level, origin), direction };
+            let pixel = y as usize * camera.size[0] as usize + x as usize;
             let texel = |cell: u32| {
                 let center = cells.places[cell as usize].as_dvec3() + 0.5;
                 cell as usize * t2 + finder.texel(&ray, center)
             };
-            if self.photo.depth.is_empty() {
-                met.clear();
-                walk(cells, &ray, 0.0, |cell, enter, leave| {
-                    let opacity = cells.opacity[cell as usize].min(OPAQUE);
-                    met.push((cell, -(1.0 - opacity).ln() * (leave - enter) as f32));
-                    true
-                });
-                shown.share(&met, &mut |cell, light, stopped| {
-                    let to = &mut found[texel(cell)];
-                    to.reach += light;
-                    to.stop(stopped, shown.rgb);
-                });
-            } else {
-                let depth = f64::from(self.photo.depth[pixel]);
-                let far = depth / ray.direction.dot(self.photo.camera.forward);
-                let hit = far / self.lattice.cell_side(level);
-                walk(cells, &ray, 0.0, |cell, _, leave| {
-                    let to = &mut found[texel(cell)];
-                    to.reach += 1.0;
-                    if hit < leave {
-                        to.stop(shown.alpha, shown.rgb);
-                    }
-                    hit >= leave
-                });
+            match &self.shot.seen {
+                Seen::Photograph(photo) => {
+                    met.clear();
+                    walk(cells, &ray, 0.0, |cell, enter, leave| {
+                        met.push((cell, optical_depth(cells, cell) * (leave - enter) as f32));
+                        true
+                    });
+                    share(&met, photo.pixels[pixel], &mut |cell, light, stopped, rgb| {
+                        let to = &mut found[texel(cell)];
+                        to.light += light;
+                        to.reach += light;
+                        to.stop(stopped, rgb);
+                    });
+                }
+                Seen::Deep(deep) => {
+                    // Depths in cells.
+                    let unit = self.lattice.cell_side(level) * direction.dot(camera.forward);
+                    let mut cut = DeepRay { deep, hits: deep.hits(pixel), next: 0, unit };
+                    walk(cells, &ray, 0.0, |cell, enter, leave| {
+                        let to = &mut found[texel(cell)];
+                        let passage = cut.between(enter, leave);
+                        to.light += cut.light();
+                        match passage {
+                            Passage::Hit(rgb) => {
+                                to.reach += 1.0;
+                                to.stop(1.0, rgb.map(srgb8_to_linear));
+                            }
+                            Passage::Clear => to.reach += 1.0,
+                            Passage::Unknown => {}
+                        }
+                        true
+                    });
+                }
             }
         }
         self.finish(level, cells, step, &found)
@@ -182,7 +191,7 @@ impl Rays<'_> {
     /// Pixels between rays: as many rays as texels of the level need.
     fn step(&self, level: u32) -> f64 {
         let texel = self.lattice.cell_side(level) / f64::from(self.options.texels);
-        let camera = &self.photo.camera;
+        let camera = &self.shot.camera;
         let depth = (self.lattice.middle() - camera.eye).dot(camera.forward);
         let pixels = texel * camera.pixels_per_area(depth.max(0.1 * self.lattice.side)).sqrt();
         let rays = if level == self.lattice.levels { 1.5 } else { RAYS_A_TEXEL };
@@ -194,12 +203,6 @@ impl Rays<'_> {
         step.min(least.max(0.25))
     }
 
-    /// The ray in cells of a level; `None` where the lens shows nothing.
-    fn local_ray(&self, level: u32, x: f64, y: f64) -> Option<LocalRay> {
-        let (origin, direction) = self.photo.camera.ray(x, y)?;
-        Some(LocalRay { origin: self.lattice.local(level, origin), direction })
-    }
-
     /// Texels from what rays found; cells that are hidden or show nothing get none.
     fn finish(&self, level: u32, cells: &Cells, step: f64, found: &[Found]) -> LevelBillboards {
         let t2 = self.shares.len();
@@ -209,13 +212,10 @@ impl Rays<'_> {
         let mut out = LevelBillboards::default();
         for (i, found) in found.chunks_exact(t2).enumerate() {
             let center = self.lattice.center(level, cells.places[i]);
-            let rays = texel_area * ray_density(&self.photo.camera, center) / (step * step);
-            let reach: f32 = found.iter().map(|f| f.reach).sum();
-            if f64::from(reach) < (1.0 - self.options.prune) * rays * all {
-                out.hidden.push(i as u32);
-            } else if found.iter().all(|f| f.stopped == 0.0) {
-                out.blank += 1;
-            } else {
+            let rays = texel_area * ray_density(&self.shot.camera, center) / (step * step);
+            let light: f32 = found.iter().map(|f| f.light).sum();
+            out.hidden.push(f64::from(light) < (1.0 - self.options.prune) * rays * all);
+            if found.iter().any(|f| f.stopped > 0.0) {
                 out.cells.push(i as u32);
                 let mean = Found::sum(found).color();
                 let texel =
@@ -233,31 +233,70 @@ fn ray_density(camera: &PhotoCamera, at: DVec3) -> f64 {
     camera.pixels_per_area(depth.max(1e-9))
 }
 
-/// What a pixel shows.
-struct Shown {
-    rgb: [f32; 3],
-    alpha: f32,
+/// Optical depth of a cell along its side.
+fn optical_depth(cells: &Cells, cell: u32) -> f32 {
+    -(1.0 - cells.opacity[cell as usize].min(OPAQUE)).ln()
 }
 
-impl Shown {
-    /// Shares a ray among the cells that it meets, given with their optical depths: `to` is told
-    /// the light that reaches each cell, and that it stops.
-    fn share(&self, met: &[(u32, f32)], to: &mut dyn FnMut(u32, f32, f32)) {
-        let all: f32 = met.iter().map(|m| m.1).sum();
-        let wanted = -(1.0 - self.alpha.min(OPAQUE)).ln();
-        let scale = match self.alpha >= OPAQUE {
-            // At least so much: what is behind an opaque front is unknown.
-            true => (wanted / all).max(1.0),
-            false => wanted / all,
-        };
-        let mut light = 1.0;
-        for &(cell, depth) in met {
-            let stopped = light * (1.0 - (-scale * depth).exp());
-            to(cell, light, stopped);
-            light -= stopped;
-            if light < DARK {
-                break;
-            }
+/// Shares what a pixel shows among the cells that its ray meets, given with their optical depths:
+/// `to` is told the light that reaches each cell, what it stops, and its linear RGB.
+fn share(met: &[(u32, f32)], [r, g, b, a]: [u8; 4], to: &mut dyn FnMut(u32, f32, f32, [f32; 3])) {
+    let rgb = [r, g, b].map(srgb8_to_linear);
+    let alpha = f32::from(a) / 255.0;
+    let all: f32 = met.iter().map(|m| m.1).sum();
+    let scale = -(1.0 - alpha.min(OPAQUE)).ln() / all;
+    // What is behind an opaque front is unknown: it is made denser, but not thinner.
+    let scale = if alpha >= OPAQUE { scale.max(1.0) } else { scale };
+    let mut light = 1.0;
+    for &(cell, depth) in met {
+        let stopped = light * (1.0 - (-scale * depth).exp());
+        to(cell, light, stopped, rgb);
+        light -= stopped;
+        if light < DARK {
+            break;
+        }
+    }
+}
+
+/// A ray of a deep picture, walked from front to back.
+struct DeepRay<'a> {
+    deep: &'a DeepPicture,
+    hits: &'a [DeepHit],
+    next: usize,
+    /// World units of depth to a unit of the walk.
+    unit: f64,
+}
+
+/// What is known of a ray between two places.
+enum Passage {
+    /// It meets this colour (sRGB).
+    Hit([u8; 3]),
+    /// It meets nothing.
+    Clear,
+    /// Something before hides it.
+    Unknown,
+}
+
+impl DeepRay<'_> {
+    /// What comes through to where it has been followed.
+    fn light(&self) -> f32 {
+        if self.next == 0 { 1.0 } else { 0.0 }
+    }
+
+    fn between(&mut self, enter: f64, leave: f64) -> Passage {
+        let depth = |t: f64| t * self.unit;
+        let (enter, leave) = (depth(enter), depth(leave));
+        while self.hits.get(self.next).is_some_and(|h| f64::from(h.depth) < enter) {
+            self.next += 1;
+        }
+        if let Some(hit) = self.hits.get(self.next).filter(|h| f64::from(h.depth) < leave) {
+            return Passage::Hit(hit.rgb);
+        }
+        let slab = self.deep.slab(0.5 * (enter + leave));
+        let before = self.next.checked_sub(1).map(|i| f64::from(self.hits[i].depth));
+        match before {
+            Some(depth) if self.deep.slab(depth) == slab => Passage::Unknown,
+            _ => Passage::Clear,
         }
     }
 }
@@ -273,7 +312,6 @@ impl Found {
     fn sum(all: &[Self]) -> Self {
         let mut sum = Self::default();
         for f in all {
-            sum.reach += f.reach;
             sum.stopped += f.stopped;
             (0..3).for_each(|k| sum.rgb[k] += f.rgb[k]);
         }
@@ -290,35 +328,11 @@ impl Found {
     /// outside; light that passes both of them is stopped by the whole when each stops, as
     /// transmittances multiply, the power of its share.
     fn texel(&self, opacity: f32, inside: f32, mean: [f32; 3]) -> [u8; 4] {
-        let alpha = ((self.stopped + PRIOR * opacity) / (self.reach + PRIOR)).min(1.0);
+        let unknown = (LEAST_REACH - self.reach).max(0.0);
+        let alpha = ((self.stopped + unknown * opacity) / (self.reach + unknown)).min(1.0);
         let shared = 1.0 - (1.0 - alpha).powf(inside);
         let rgb = if self.stopped > 0.0 { self.color() } else { mean };
         let [r, g, b] = rgb.map(linear_to_srgb8);
         [r, g, b, (shared * 255.0).round() as u8]
-    }
-}
-
-/// "The pruning strategy is applied recursively to the entire octree structure" (section 3.2):
-/// what is hidden goes with all that it holds.
-fn prune_children(levels: &[Cells], billboards: &mut [LevelBillboards], texels: u32) {
-    let t2 = (texels * texels) as usize;
-    for level in 1..billboards.len() {
-        let mut hidden = vec![false; levels[level].places.len()];
-        for &cell in &billboards[level - 1].hidden {
-            let (first, mask) = levels[level - 1].children[cell as usize];
-            hidden[first as usize..first as usize + mask.count_ones() as usize].fill(true);
-        }
-        let here = &mut billboards[level];
-        here.hidden.iter().for_each(|&cell| hidden[cell as usize] = true);
-        let old = std::mem::take(here);
-        for (&cell, texels) in old.cells.iter().zip(old.texels.chunks_exact(t2)) {
-            if !hidden[cell as usize] {
-                here.cells.push(cell);
-                here.texels.extend_from_slice(texels);
-            }
-        }
-        here.hidden = (0..).zip(&hidden).filter(|(_, h)| **h).map(|(i, _)| i).collect();
-        here.blank =
-            levels[level].places.len() as u64 - (here.cells.len() + here.hidden.len()) as u64;
     }
 }

@@ -142,12 +142,7 @@ mod tests {
                     let inside = (middle - from).cross(along).length() < 0.5;
                     [90, 80, 70, if inside { 255 } else { 0 }]
                 });
-                Photograph {
-                    name: format!("{i}.png"),
-                    camera,
-                    pixels: pixels.collect(),
-                    depth: vec![],
-                }
+                Photograph { name: format!("{i}.png"), camera, pixels: pixels.collect() }
             })
             .collect()
     }

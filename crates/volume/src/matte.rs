@@ -73,7 +73,7 @@ mod tests {
         pixels[8 + 2] = [9, 9, 9, 255]; // x 2 … 3 in pixels, y 1 … 2: world −2 … −1, 0 … 1
         pixels[31] = [9, 9, 9, 51];
         let camera = PhotoCamera::from(&camera);
-        let photo = Photograph { name: "a".into(), camera, pixels, depth: vec![] };
+        let photo = Photograph { name: "a".into(), camera, pixels };
         let matte = Matte::new(&photo);
         assert!((matte.mean([2, 0], [2, 2]) - 0.25).abs() < 1e-12);
         assert!((matte.mean([0, 0], [8, 4]) - 1.2 / 32.0).abs() < 1e-12);

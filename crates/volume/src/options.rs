@@ -12,6 +12,15 @@ pub enum Coarse {
     Below,
 }
 
+/// From where a cell must be hidden for a camera to have no billboard of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Prune {
+    /// From the camera itself (paper 004, section 3.2): viewers beside it see holes.
+    Own,
+    /// From the camera and its six nearest neighbours.
+    Neighbours,
+}
+
 /// In which space codebooks are trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Space {
@@ -84,6 +93,8 @@ pub struct VolumeOptions {
     /// A cell has no billboard for a camera from which what is before it hides more than this share
     /// of it, 0 … 1; 1 keeps all.
     pub prune: f64,
+    /// From where.
+    pub prune_by: Prune,
     /// Textures of coarser levels.
     pub coarse: Coarse,
 }
@@ -96,6 +107,7 @@ impl Default for VolumeOptions {
             levels: Branching::Octree.usual_levels(),
             texels: 4,
             prune: 0.98,
+            prune_by: Prune::Neighbours,
             coarse: Coarse::Photographs,
         }
     }

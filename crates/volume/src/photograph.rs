@@ -1,7 +1,7 @@
-//! Photographs of a mesh, where there are none of the tree: parallel, with depth.
+//! Photographs of a mesh, where there are none of the tree: parallel, and deep.
 
 use crate::lattice::Lattice;
-use forest_raster::{Buffers, CaptureScene, Subject};
+use forest_raster::{Buffers, CaptureScene, DeepPicture};
 use forest_soup::{Camera, PhotoCamera, Photograph, Projection};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -51,29 +51,54 @@ impl Stand {
     }
 }
 
+/// What cells are textured from: a camera, and what its pixels show.
+pub(crate) struct Shot<'a> {
+    pub(crate) camera: PhotoCamera,
+    pub(crate) seen: Seen<'a>,
+}
+
+impl<'a> Shot<'a> {
+    pub(crate) fn of(photo: &'a Photograph) -> Self {
+        Self { camera: photo.camera, seen: Seen::Photograph(photo) }
+    }
+}
+
+/// What pixels show.
+pub(crate) enum Seen<'a> {
+    /// sRGB and a matte, of things at unknown depths.
+    Photograph(&'a Photograph),
+    /// Things at known depths, one behind the other.
+    Deep(DeepPicture),
+}
+
 /// Rays along the side of a texel, at least: billboards are up to √3 times as wide as their cells.
 const RAYS_A_TEXEL: f64 = 1.5;
 
 /// Longest side of a photograph.
 const MAX_SIDE: f64 = 8192.0;
 
-/// Photographs of what stands in the box `bounds` (its corners, in the world), as fine as billboards
-/// of `texels` need it.
+/// Finest cells in a slab: within it one thing hides another.
+const CELLS_A_SLAB: f64 = 4.0;
+
+/// Deep photographs of what stands in the box `bounds` (its corners, in the world), as fine as
+/// billboards of `texels` need it.
 pub(crate) fn photographs(
     scene: &CaptureScene,
     bounds: [DVec3; 2],
     lattice: &Lattice,
     texels: u32,
     stand: Stand,
-) -> Vec<Photograph> {
-    let wanted = lattice.cell_side(lattice.levels) / (f64::from(texels) * RAYS_A_TEXEL);
+) -> Vec<Shot<'static>> {
+    let cell = lattice.cell_side(lattice.levels);
+    let wanted = cell / (f64::from(texels) * RAYS_A_TEXEL);
     let middle = (bounds[0] + bounds[1]) * 0.5;
     let half = (bounds[1] - bounds[0]) * 0.5;
-    let directions = stand.directions();
-    let numbered: Vec<(usize, DVec3)> = directions.into_iter().enumerate().collect();
-    numbered
+    // Coarse trees need no thicker slabs than a few dozen of them.
+    let slab = (CELLS_A_SLAB * cell).min(lattice.side / 16.0);
+    stand
+        .directions()
         .into_par_iter()
-        .map_init(Buffers::default, |buffers, (i, from)| {
+        .map_init(Buffers::default, |buffers, from| {
             let eye = middle + from * (2.0 * half.length());
             let unit = Projection::Orthographic { height: 1.0 };
             let frame = Camera::new(eye, -from, unit, [1, 1]);
@@ -82,13 +107,8 @@ pub(crate) fn photographs(
             let size = reach.map(|r| (r / pixel).ceil() as u32 + 2);
             let height = f64::from(size[1]) * pixel;
             let camera = Camera::new(eye, -from, Projection::Orthographic { height }, size);
-            let picture = scene.capture(&camera, 1, buffers).picture;
-            Photograph {
-                name: format!("camera {i}"),
-                camera: PhotoCamera::from(&camera),
-                pixels: picture.straight(),
-                depth: picture.depth,
-            }
+            let seen = Seen::Deep(scene.deep(&camera, slab, buffers));
+            Shot { camera: PhotoCamera::from(&camera), seen }
         })
         .collect()
 }

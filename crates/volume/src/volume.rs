@@ -9,7 +9,8 @@ use crate::header::NodeRecord;
 use crate::lattice::Lattice;
 use crate::matte::Matte;
 use crate::options::VolumeOptions;
-use crate::photograph::{MAX_CAMERAS, Stand, photographs};
+use crate::photograph::{MAX_CAMERAS, Seen, Shot, Stand, photographs};
+use crate::prune::pruned;
 use crate::tomography::{TomographyOptions, TomographyReport, estimate};
 use forest_raster::{CaptureScene, Surfaces};
 use forest_soup::{Photograph, TriangleSoup};
@@ -102,15 +103,15 @@ impl Volume {
         let lattice = cube(bounds, options.branching, options.levels);
         let start = Instant::now();
         let scene = CaptureScene::new(soup, surfaces);
-        let photos = photographs(&scene, bounds, &lattice, options.texels, stand);
+        let shots = photographs(&scene, bounds, &lattice, options.texels, stand);
         let taken = start.elapsed();
         drop(scene);
         let start = Instant::now();
         let mut opacity = coverage(&lattice, soup, surfaces);
-        mark(&lattice, &photos, &mut opacity);
+        mark(&lattice, &shots, &mut opacity);
         let report =
             VolumeReport { photographs: taken, opacity: start.elapsed(), ..Default::default() };
-        Ok(Self::assemble(lattice, bounds, &photos, &opacity, options, report, progress))
+        Ok(Self::assemble(lattice, bounds, &shots, &opacity, options, report, progress))
     }
 
     /// Makes a volume of photographs with mattes. Levels whose cells would be finer than their
@@ -157,14 +158,15 @@ impl Volume {
             tomography: Some(estimated),
             ..Default::default()
         };
-        Ok(Self::assemble(lattice, bounds, photos, &opacity, options, report, &tick))
+        let shots: Vec<Shot> = photos.iter().map(Shot::of).collect();
+        Ok(Self::assemble(lattice, bounds, &shots, &opacity, options, report, &tick))
     }
 
     /// Billboards of all cameras, and the nodes that hold them.
     fn assemble(
         lattice: Lattice,
         bounds: [DVec3; 2],
-        photos: &[Photograph],
+        shots: &[Shot],
         opacity: &Opacity,
         options: &VolumeOptions,
         mut report: VolumeReport,
@@ -172,25 +174,35 @@ impl Volume {
     ) -> Self {
         let levels = cells(&lattice, opacity);
         let radius = 0.5 * bounds[0].distance(bounds[1]);
-        let frame = |p: &Photograph| CameraFrame::of(&p.camera, lattice.middle(), radius);
-        let frames: Vec<CameraFrame> = photos.iter().map(frame).collect();
+        let frame = |s: &Shot| CameraFrame::of(&s.camera, lattice.middle(), radius);
+        let frames: Vec<CameraFrame> = shots.iter().map(frame).collect();
         let done = AtomicU64::new(0);
-        let cameras: Vec<CameraBillboards> = photos
+        let mut cameras: Vec<CameraBillboards> = shots
             .par_iter()
             .zip(&frames)
-            .map(|(photo, frame)| {
-                let made = billboards(&lattice, &levels, photo, frame, options);
+            .map(|(shot, frame)| {
+                let made = billboards(&lattice, &levels, shot, frame, options);
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 made
             })
             .collect();
         report.billboards =
             [cameras.iter().map(|c| c.finest).sum(), cameras.iter().map(|c| c.coarser).sum()];
-        let count = |level: usize| LevelCounts {
-            cells: levels[level].places.len() as u64,
-            pairs: (levels[level].places.len() * cameras.len()) as u64,
-            hidden: cameras.iter().map(|c| c.levels[level].hidden.len() as u64).sum(),
-            blank: cameras.iter().map(|c| c.levels[level].blank).sum(),
+        let pruned = pruned(&levels, &cameras, &frames, options.prune_by);
+        let t2 = (options.texels * options.texels) as usize;
+        cameras.par_iter_mut().zip(&pruned).for_each(|(camera, pruned)| {
+            camera
+                .levels
+                .iter_mut()
+                .zip(pruned)
+                .for_each(|(level, pruned)| level.remove(pruned, t2));
+        });
+        let count = |level: usize| {
+            let (cells, all) = (levels[level].places.len() as u64, cameras.len() as u64);
+            let of = |p: &Vec<Vec<bool>>| p[level].iter().filter(|p| **p).count() as u64;
+            let hidden = pruned.iter().map(of).sum();
+            let kept: u64 = cameras.iter().map(|c| c.levels[level].cells.len() as u64).sum();
+            LevelCounts { cells, pairs: cells * all, hidden, blank: cells * all - hidden - kept }
         };
         report.levels = (0..levels.len()).map(count).collect();
         let levels = nodes(&levels, &cameras, options.texels);
@@ -232,27 +244,26 @@ fn cell_pixels(lattice: &Lattice, photos: &[Photograph]) -> f64 {
     photos.iter().map(pixels).fold(0.0, f64::max)
 }
 
-/// Makes sure that what photographs show at a known depth lies in a cell.
-fn mark(lattice: &Lattice, photos: &[Photograph], opacity: &mut Opacity) {
+/// Makes sure that what deep pictures show lies in a cell.
+fn mark(lattice: &Lattice, shots: &[Shot], opacity: &mut Opacity) {
     let finest = lattice.levels;
     let n = f64::from(lattice.cells(finest));
-    for photo in photos {
-        let places: Vec<UVec3> = (0..photo.pixels.len() as u32)
+    for shot in shots {
+        let Seen::Deep(deep) = &shot.seen else { continue };
+        let missing: Vec<UVec3> = (0..deep.width * deep.height)
             .into_par_iter()
-            .filter_map(|i| {
-                let depth = f64::from(*photo.depth.get(i as usize)?);
-                if photo.pixels[i as usize][3] == 0 || !depth.is_finite() {
-                    return None;
-                }
-                let width = photo.camera.size[0];
-                let (x, y) = (f64::from(i % width) + 0.5, f64::from(i / width) + 0.5);
-                let (from, along) = photo.camera.ray(x, y)?;
-                let hit = from + along * (depth / along.dot(photo.camera.forward));
-                let at = lattice.local(finest, hit).clamp(DVec3::ZERO, DVec3::splat(n - 1.0));
-                Some(at.as_uvec3())
+            .flat_map_iter(|i| {
+                let (x, y) = (f64::from(i % deep.width) + 0.5, f64::from(i / deep.width) + 0.5);
+                let (from, along) = shot.camera.ray(x, y).expect("no lens");
+                let known = &opacity.0[finest as usize];
+                deep.hits(i as usize).iter().filter_map(move |hit| {
+                    let at = lattice.local(finest, from + along * f64::from(hit.depth));
+                    let place = at.clamp(DVec3::ZERO, DVec3::splat(n - 1.0)).as_uvec3();
+                    (known[lattice.dense(finest, place)] == 0.0).then_some(place)
+                })
             })
             .collect();
-        for mut place in places {
+        for mut place in missing {
             for level in (0..=finest).rev() {
                 let cell = &mut opacity.0[level as usize][lattice.dense(level, place)];
                 if *cell > 0.0 {

@@ -136,7 +136,7 @@ fn photograph(
         pose(source, &element, &frame.transform_matrix)?.map(|v| up.to_y(v));
     let camera = PhotoCamera { eye, right, up, forward: -back, optics, size };
     let pixels = rgba.pixels().map(|p| p.0).collect();
-    Ok(Photograph { name: frame.file_path.clone(), camera, pixels, depth: Vec::new() })
+    Ok(Photograph { name: frame.file_path.clone(), camera, pixels })
 }
 
 /// Largest deviation of a pose's axes from unit length and right angles.

@@ -67,6 +67,14 @@ impl Samples {
         }
     }
 
+    /// Columns and rows of samples that may show something, of a grid of `size`.
+    pub(super) fn touched_samples(&self, size: [u32; 2]) -> [std::ops::Range<u32>; 2] {
+        std::array::from_fn(|k| {
+            let [from, to] = self.touched[k];
+            (from.min(to) * BLOCK)..(to * BLOCK).min(size[k])
+        })
+    }
+
     /// Number of the block at column `x` and row `y` of blocks.
     #[inline(always)]
     pub(super) fn number(&self, x: u32, y: u32) -> usize {

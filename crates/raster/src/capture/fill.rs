@@ -1,6 +1,6 @@
 //! Triangles into the sample buffer, in fixed point, a block of samples at a time.
 
-use super::blocks::{BLOCK, LANES, Samples};
+use super::blocks::{BLOCK, LANES, NOTHING, Samples};
 use super::prepare::{Cluster, Prepared};
 use super::{CaptureScene, FixedProjection};
 use crate::opacity::covers;
@@ -195,6 +195,29 @@ impl Edges {
     }
 }
 
+/// What is drawn lies between two depths (bits), the front one included.
+#[derive(Clone, Copy)]
+pub(super) struct Slab {
+    pub(super) front: i32,
+    pub(super) back: i32,
+}
+
+impl Slab {
+    /// Everything.
+    pub(super) const ALL: Self = Self { front: 0, back: NOTHING };
+
+    /// From one depth to another, from the scene's front.
+    pub(super) fn new(front: f32, back: f32) -> Self {
+        Self { front: depth_bits(front.max(0.0)), back: depth_bits(back.max(0.0)) }
+    }
+
+    /// Whether what reaches over these depths lies outside.
+    #[inline(always)]
+    pub(super) fn misses(&self, nearest: f32, farthest: f32) -> bool {
+        depth_bits(nearest.max(0.0)) >= self.back || depth_bits(farthest.max(0.0)) < self.front
+    }
+}
+
 /// Gains within this keep the values of a block in 32 bits: for edges of up to 1024 samples.
 const MOST_GAIN: i32 = 1 << 18;
 
@@ -221,7 +244,14 @@ impl CaptureScene<'_> {
 
     /// Draws triangle number `i`.
     #[inline(always)]
-    pub(super) fn fill(&self, i: u32, vertices: &[Vertex], places: &Places, samples: &mut Samples) {
+    pub(super) fn fill(
+        &self,
+        i: u32,
+        vertices: &[Vertex],
+        places: &Places,
+        slab: Slab,
+        samples: &mut Samples,
+    ) {
         let corners = self.corners[i as usize];
         let [a, b, c] = corners.map(|v| vertices[v as usize]);
         let (left, right) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
@@ -265,7 +295,8 @@ impl CaptureScene<'_> {
                 // The sign bit of each says whether the triangle wins the sample.
                 let mut wins = [0i32; LANES];
                 for lane in 0..LANES {
-                    wins[lane] = !outside[lane] & (depths[lane] - block.depth[lane]);
+                    let inside = !(depths[lane] - slab.front) & (depths[lane] - slab.back);
+                    wins[lane] = !outside[lane] & inside & (depths[lane] - block.depth[lane]);
                 }
                 if let Some(coverage) = &coverage {
                     for (lane, wins) in wins.iter_mut().enumerate().filter(|(_, w)| **w < 0) {

@@ -7,17 +7,19 @@
 //! opacity follows the same hash rule.
 
 mod blocks;
+mod deep;
 mod fill;
 mod prepare;
 mod resolve;
 mod sky;
 
+pub use deep::{DeepHit, DeepPicture};
 pub use sky::Skylight;
 
 use crate::picture::Picture;
 use crate::surface::Surfaces;
 use blocks::{BLOCK, Samples};
-use fill::{Places, Vertex};
+use fill::{Places, Slab, Vertex};
 use forest_soup::{AlphaMode, Camera, CoverageMap, Projection, TriangleSoup};
 use glam::{DVec3, Vec2, Vec3};
 use prepare::{Cluster, Prepared};
@@ -73,6 +75,8 @@ pub struct CaptureScene<'a> {
 struct Grid {
     /// Samples along a side of a pixel.
     samples: u32,
+    /// Samples across and down.
+    size: [u32; 2],
     /// World length of a sample.
     step: f64,
     /// Depth of the scene's front.
@@ -121,6 +125,21 @@ impl<'a> CaptureScene<'a> {
 
     /// Draws the scene into the sample buffer of `buffers`.
     fn draw(&self, camera: &Camera, samples: u32, buffers: &mut Buffers) -> Grid {
+        let grid = self.grid(camera, samples);
+        buffers.vertices.resize(self.positions.len(), Vertex::default());
+        self.draw_slab(&grid, Slab::ALL, buffers);
+        grid
+    }
+
+    /// Draws what lies in `slab` into the sample buffer of `buffers`, whose vertices are allocated.
+    fn draw_slab(&self, grid: &Grid, slab: Slab, buffers: &mut Buffers) {
+        buffers.samples.clear(grid.size);
+        // Compiled for the vector instructions of several machines; the results are the same.
+        pulp::Arch::new().dispatch(FillAll { scene: self, grid, slab, buffers });
+    }
+
+    /// The sample grid of a view.
+    fn grid(&self, camera: &Camera, samples: u32) -> Grid {
         let Projection::Orthographic { height } = camera.projection else {
             panic!("captures are parallel views");
         };
@@ -132,31 +151,30 @@ impl<'a> CaptureScene<'a> {
         let offset = self.middle - camera.eye;
         let step = height / f64::from(size[1]);
         let projection = FixedProjection::new(camera, size, step, offset, self.radius);
-        let grid = Grid {
+        Grid {
             samples,
+            size,
             step,
             depth: offset.dot(camera.forward) - 1.001 * self.radius,
             back: -camera.forward.as_vec3(),
             projection,
             places: Places::new(samples),
-        };
-        buffers.samples.clear(size);
-        buffers.vertices.resize(self.positions.len(), Vertex::default());
-        // Compiled for the vector instructions of several machines; the results are the same.
-        pulp::Arch::new().dispatch(FillAll { scene: self, grid: &grid, buffers });
-        grid
+        }
     }
 
     /// Draws all triangles, cluster by cluster from front to back: what is hidden is mostly met when
     /// it is hidden already.
     #[inline(always)]
-    fn fill_all(&self, grid: &Grid, Buffers { vertices, samples }: &mut Buffers) {
+    fn fill_all(&self, grid: &Grid, slab: Slab, Buffers { vertices, samples }: &mut Buffers) {
         let projection = &grid.projection;
         let mut order: Vec<(f32, u32)> =
             (0..).zip(&self.clusters).map(|(i, c)| (projection.nearest(c), i)).collect();
         order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (nearest, c) in order {
             let cluster = &self.clusters[c as usize];
+            if slab.misses(nearest, nearest + 2.0 * cluster.radius) {
+                continue;
+            }
             if self.is_cluster_hidden(cluster, projection, nearest, samples) {
                 continue;
             }
@@ -165,7 +183,7 @@ impl<'a> CaptureScene<'a> {
                 *to = projection.vertex(*p);
             }
             for i in cluster.triangles.clone() {
-                self.fill(i, vertices, &grid.places, samples);
+                self.fill(i, vertices, &grid.places, slab, samples);
             }
         }
     }
@@ -175,6 +193,7 @@ impl<'a> CaptureScene<'a> {
 struct FillAll<'a, 's> {
     scene: &'a CaptureScene<'s>,
     grid: &'a Grid,
+    slab: Slab,
     buffers: &'a mut Buffers,
 }
 
@@ -183,7 +202,7 @@ impl pulp::WithSimd for FillAll<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        self.scene.fill_all(self.grid, self.buffers);
+        self.scene.fill_all(self.grid, self.slab, self.buffers);
     }
 }
 

@@ -8,8 +8,8 @@ use crate::picture::Picture;
 use glam::Vec3;
 
 /// What a sample adds to its pixel.
-struct Shaded {
-    rgb: [f32; 3],
+pub(super) struct Shaded {
+    pub(super) rgb: [f32; 3],
     /// Towards the eye.
     normal: Vec3,
     sky: f32,
@@ -64,6 +64,24 @@ impl CaptureScene<'_> {
             }
         }
         Capture { picture, sky }
+    }
+
+    /// What one sample shows, at `depth` from the scene's front.
+    pub(super) fn sample(
+        &self,
+        grid: &Grid,
+        vertices: &[Vertex],
+        [x, y]: [u32; 2],
+        triangle: u32,
+        depth: f32,
+    ) -> Shaded {
+        let t = &self.triangles[triangle as usize];
+        if f64::from(t.area) <= grid.step * grid.step {
+            return self.mean(triangle, t, grid.back);
+        }
+        let place = grid.places.of(x, y).map(i64::from);
+        let part = Part { triangle, count: 1, place, depth };
+        self.shade(&part, t, vertices, grid.back)
     }
 
     /// What a triangle shows that is smaller than a pixel.

@@ -145,3 +145,42 @@ fn a_floor_under_a_roof_sees_no_sky() {
         assert!(below > if floor { 0.99 } else { 0.9 }, "{below}");
     }
 }
+
+#[test]
+fn deep_pictures_know_each_slab_and_agree_with_the_flat_one() {
+    // Walls at z = 0, −1 and −1.02: the last two lie in one slab.
+    let wall = |z: f32| {
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]: [f32; 2]| Vec3::new(x, y, z))
+    };
+    let soup = TriangleSoup {
+        positions: [wall(0.0), wall(-1.0), wall(-1.02)].concat(),
+        triangles: (0..3)
+            .flat_map(|w| [[4 * w, 4 * w + 1, 4 * w + 2], [4 * w, 4 * w + 2, 4 * w + 3]])
+            .collect(),
+        triangle_materials: vec![0; 6],
+        materials: vec![Material { base_color: [0.5, 0.25, 0.0, 1.0], ..Material::default() }],
+        ..TriangleSoup::default()
+    };
+    let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+    let scene = CaptureScene::new(&soup, &surfaces);
+    let projection = Projection::Orthographic { height: 4.0 };
+    let camera = Camera::new(DVec3::new(0.0, 0.0, 5.0), -DVec3::Z, projection, [32, 32]);
+    let mut buffers = Buffers::default();
+    let flat = scene.capture(&camera, 1, &mut buffers).picture;
+    let deep = scene.deep(&camera, 0.5, &mut buffers);
+    let mut seen = 0;
+    for pixel in 0..32 * 32 {
+        let hits = deep.hits(pixel);
+        assert_eq!(hits.first().map_or(f32::INFINITY, |h| h.depth), flat.depth[pixel]);
+        if let [a, b] = hits {
+            assert!((a.depth - 5.0).abs() < 1e-5 && (b.depth - 6.0).abs() < 1e-5, "{hits:?}");
+            assert_eq!(a.rgb, [188, 137, 0]);
+            assert!(deep.slab(f64::from(b.depth)) > deep.slab(f64::from(a.depth)));
+            seen += 1;
+        } else {
+            assert!(hits.is_empty(), "{hits:?}");
+        }
+    }
+    assert_eq!(seen, 256);
+}
