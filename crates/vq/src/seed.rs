@@ -2,6 +2,7 @@
 
 use crate::distance::{LANES, squared};
 use crate::lloyd::Sample;
+use crate::search::Bits;
 use crate::words::{Blocks, bounds, limit, square};
 use rand::RngExt;
 use rand_pcg::Pcg32;
@@ -13,7 +14,7 @@ const DRAWS: usize = 4;
 /// `words` rows, each drawn by its squared distance from those before it, and the distances that
 /// were computed. Rows are distinct and no fewer than `words`.
 pub(crate) fn plus_plus(sample: Sample, words: usize, random: &mut Pcg32) -> (Vec<u32>, u64) {
-    let blocks = Blocks::new(&sample.sketches[..sample.len()]);
+    let blocks = Blocks::new(sample.sketches[..sample.len()].iter().copied());
     let mut state = State::new(sample, &blocks);
     let mut chosen = vec![false; sample.len()];
     let mut order = Vec::with_capacity(words);
@@ -137,7 +138,7 @@ impl pulp::WithSimd for Try<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let Self { state, trial } = self;
         let sample = state.sample;
         let sketch = sample.sketches[trial.row as usize];
@@ -146,25 +147,21 @@ impl pulp::WithSimd for Try<'_> {
         (trial.gain, trial.computed) = (0.0, 0);
         // What `limit` adds at distance 0, and what it multiplies distances by.
         let (own, reach) = (square(&sketch), state.blocks.reach);
-        let more = limit(0.0, word.len(), own, reach);
+        let more = limit(0.0, word.len(), own, reach) - own;
         let factor = limit(1.0, word.len(), 0.0, 0.0);
+        let twice = sketch.map(|v| -2.0 * v);
         for (b, (block, nearest)) in state.blocks.blocks.iter().zip(&state.nearest).enumerate() {
-            let mut out = [[[0f32; LANES]; 1]];
-            bounds(std::slice::from_ref(block), &[sketch], &mut out);
-            let bounds = out[0][0];
-            let mut left = [0u32; LANES];
-            for l in 0..LANES {
-                left[l] = u32::from(bounds[l] <= nearest[l] * factor + more);
+            let bounds = bounds(simd, block, &twice).lanes().0;
+            let mut left = 0u32;
+            for (l, (bound, nearest)) in bounds.iter().zip(nearest).enumerate() {
+                left |= if *bound <= nearest * factor + more { 1 << l } else { 0 };
             }
-            if left.iter().sum::<u32>() == 0 {
-                continue;
-            }
-            for l in 0..LANES {
+            for l in Bits(left) {
                 let i = b * LANES + l;
-                if left[l] == 0 || i >= sample.len() {
-                    continue;
+                if i >= sample.len() {
+                    break;
                 }
-                let distance = squared(sample.rows.row(i), word);
+                let distance = squared(simd, sample.rows.row(i), word);
                 trial.computed += 1;
                 if distance < nearest[l] {
                     trial.gain += state.error(i) - f64::from(distance) * sample.weights[i];

@@ -1,6 +1,7 @@
 //! From vectors to a codebook.
 
 use crate::codebook::Codebook;
+use crate::distance::Lanes;
 use crate::error::VqError;
 use crate::lloyd::{Assignment, Sample};
 use crate::options::{Centers, Seeding, TrainOptions};
@@ -74,7 +75,8 @@ pub fn train(
     indices.truncate(heavy);
     indices.extend(crate::assign::nearest(&run.best.words, &light.values, &run.sketcher));
     let dimension = vectors.dimension();
-    let words = run.best.words.values.chunks_exact(width).flat_map(|w| &w[..dimension]).copied();
+    let words = run.best.words.values.chunks_exact(width);
+    let words = words.flat_map(|w| w.iter().flat_map(|lanes| lanes.0).take(dimension));
     Ok(Training {
         codebook: Codebook::new(dimension, words.collect())?,
         indices: distinct.row_of.iter().map(|&r| indices[r as usize]).collect(),
@@ -136,7 +138,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn words(&self, values: Vec<f32>) -> Words {
+    fn words(&self, values: Vec<Lanes>) -> Words {
         Words::new(self.distinct.rows.width, values, &self.sketcher)
     }
 
