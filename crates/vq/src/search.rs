@@ -58,15 +58,15 @@ fn nearest<S: Simd>(
     let twice = sketch.map(|v| -2.0 * v);
     let guess = if guess == NONE { near(simd, words, sketch, &twice) } else { guess };
     let (mut index, mut distance) = (guess, squared(simd, row, words.word(guess as usize)));
-    let (own, reach) = (square(sketch), words.sketches.reach);
+    let (own, reach) = (square(sketch), words.gathered.sketches.reach);
     let mut most = limit(distance, row.len(), own, reach);
     let mut computed = 1;
-    for (first, boxes) in (0..).step_by(LANES).zip(&words.boxes) {
+    for (first, boxes) in (0..).step_by(LANES).zip(&words.gathered.boxes) {
         for l in Bits(box_bounds(simd, boxes, sketch).at_most(simd, most)) {
             let b = first + l;
-            let bounds = bounds(simd, &words.sketches.blocks[b], &twice);
+            let bounds = bounds(simd, &words.gathered.sketches.blocks[b], &twice);
             for l in Bits(bounds.at_most(simd, most - own)) {
-                let word = words.numbers[b * LANES + l];
+                let word = words.gathered.numbers[b * LANES + l];
                 if word == guess {
                     continue;
                 }
@@ -100,14 +100,14 @@ impl Iterator for Bits {
 #[inline(always)]
 fn near<S: Simd>(simd: S, words: &Words, sketch: &Sketch, twice: &Sketch) -> u32 {
     let (mut least, mut block) = (f32::INFINITY, 0);
-    for (b, boxes) in words.boxes.iter().enumerate() {
+    for (b, boxes) in words.gathered.boxes.iter().enumerate() {
         let (l, bound) = lowest(&box_bounds(simd, boxes, sketch).lanes());
         if bound < least {
             (least, block) = (bound, b * LANES + l);
         }
     }
-    let (l, _) = lowest(&bounds(simd, &words.sketches.blocks[block], twice).lanes());
-    words.numbers[block * LANES + l]
+    let (l, _) = lowest(&bounds(simd, &words.gathered.sketches.blocks[block], twice).lanes());
+    words.gathered.numbers[block * LANES + l]
 }
 
 /// The first lowest, and its place.

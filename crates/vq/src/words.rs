@@ -45,24 +45,19 @@ pub(crate) struct Boxes {
     high: [Lanes; PARTS],
 }
 
-/// Words in a row, and their sketches.
-pub(crate) struct Words {
-    /// Lanes of a word.
-    pub(crate) width: usize,
-    pub(crate) values: Vec<Lanes>,
-    /// Words that are near each other share a block.
+/// Sketches in blocks of neighbours.
+pub(crate) struct Gathered {
     pub(crate) sketches: Blocks,
-    /// The words of each block, in order.
+    /// Which sketches are in each block, in order.
     pub(crate) numbers: Vec<u32>,
     /// The boxes of the blocks; infinitely far behind the last one.
     pub(crate) boxes: Vec<Boxes>,
 }
 
-impl Words {
-    pub(crate) fn new(width: usize, values: Vec<Lanes>, sketcher: &Sketcher) -> Self {
-        let sketches = sketcher.sketches(&values);
+impl Gathered {
+    pub(crate) fn new(sketches: &[Sketch]) -> Self {
         let mut numbers: Vec<u32> = (0..sketches.len() as u32).collect();
-        gather(&mut numbers, &sketches);
+        gather(&mut numbers, sketches);
         let far = [Lanes([f32::INFINITY; LANES]); PARTS];
         let count = numbers.len().div_ceil(LANES).div_ceil(LANES);
         let mut boxes = vec![Boxes { low: far, high: far }; count];
@@ -75,7 +70,22 @@ impl Words {
             }
         }
         let sketches = Blocks::new(numbers.iter().map(|&i| sketches[i as usize]));
-        Self { width, values, sketches, numbers, boxes }
+        Self { sketches, numbers, boxes }
+    }
+}
+
+/// Words in a row, and their sketches.
+pub(crate) struct Words {
+    /// Lanes of a word.
+    pub(crate) width: usize,
+    pub(crate) values: Vec<Lanes>,
+    pub(crate) gathered: Gathered,
+}
+
+impl Words {
+    pub(crate) fn new(width: usize, values: Vec<Lanes>, sketcher: &Sketcher) -> Self {
+        let gathered = Gathered::new(&sketcher.sketches(&values));
+        Self { width, values, gathered }
     }
 
     pub(crate) fn len(&self) -> usize {
