@@ -1,6 +1,7 @@
 //! The nearest words of vectors.
 
 use crate::codebook::Codebook;
+use crate::distance::Lanes;
 use crate::rows::Rows;
 use crate::search::{NONE, Search};
 use crate::sketch::Sketcher;
@@ -30,7 +31,7 @@ pub fn assign(codebook: &Codebook, vectors: &Vectors) -> Vec<u32> {
 }
 
 /// The nearest words of padded vectors.
-pub(crate) fn nearest(words: &Words, rows: &[f32], sketcher: &Sketcher) -> Vec<u32> {
+pub(crate) fn nearest(words: &Words, rows: &[Lanes], sketcher: &Sketcher) -> Vec<u32> {
     let sketches = sketcher.sketches(rows);
     let mut indices = vec![NONE; sketches.len()];
     let mut distances = vec![0.0; sketches.len()];

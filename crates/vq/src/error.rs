@@ -19,7 +19,10 @@ pub enum VqError {
     #[error("{0} vectors; the limit is {limit}", limit = u32::MAX)]
     TooMany(usize),
     /// A value is not finite, or so large that squared distances would not be.
-    #[error("row {row}, element {element}: {value}; finite values within ±{limit:e}", limit = crate::MAX_VALUE)]
+    #[error(
+        "row {row}, element {element}: {value}; finite values within ±{limit:e}",
+        limit = crate::MAX_VALUE
+    )]
     Value {
         /// The vector.
         row: usize,

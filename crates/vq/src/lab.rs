@@ -9,16 +9,14 @@ use palette::{FromColor, Lab, LinSrgb, white_point::D65};
 /// Lightness L, 0 … 100, and the axes a (green to red) and b (blue to yellow), about ±128, of linear
 /// red, green and blue, 0 … 1. Outside that range the formula goes on.
 pub fn linear_to_lab(rgb: [f32; 3]) -> [f32; 3] {
-    let [r, g, b] = rgb.map(f64::from);
-    let lab: Lab<D65, f64> = Lab::from_color(LinSrgb::new(r, g, b));
-    [lab.l as f32, lab.a as f32, lab.b as f32]
+    let lab: Lab<D65, f32> = Lab::from_color(LinSrgb::from(rgb));
+    [lab.l, lab.a, lab.b]
 }
 
-/// The inverse of [`linear_to_lab`]; colours that no screen shows come out below 0 or above 1.
-pub fn lab_to_linear(lab: [f32; 3]) -> [f32; 3] {
-    let [l, a, b] = lab.map(f64::from);
-    let rgb: LinSrgb<f64> = LinSrgb::from_color(Lab::<D65, f64>::new(l, a, b));
-    [rgb.red as f32, rgb.green as f32, rgb.blue as f32]
+/// The inverse of [`linear_to_lab`], by less than 1/1024 on colours in range; colours that no screen
+/// shows come out below 0 or above 1.
+pub fn lab_to_linear([l, a, b]: [f32; 3]) -> [f32; 3] {
+    LinSrgb::from_color(Lab::<D65, f32>::new(l, a, b)).into()
 }
 
 #[cfg(test)]

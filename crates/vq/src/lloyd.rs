@@ -4,7 +4,7 @@
 //! Rows are taken in chunks whose number depends on the data alone; their sums, in f64, are added
 //! in order: threads change nothing.
 
-use crate::distance::{squared, squared_f64};
+use crate::distance::{LANES, Lanes, squared};
 use crate::rows::Rows;
 use crate::search::Search;
 use crate::sketch::Sketch;
@@ -31,7 +31,7 @@ impl<'a> Sample<'a> {
     }
 
     /// Padded values of all rows.
-    fn values(self) -> &'a [f32] {
+    fn values(self) -> &'a [Lanes] {
         &self.rows.values[..self.len() * self.rows.width]
     }
 
@@ -51,7 +51,7 @@ pub(crate) struct Assignment {
 /// Sums over the rows of each word.
 pub(crate) struct Sums {
     /// Weighted sums of the vectors, `width` a word.
-    vectors: Vec<f64>,
+    vectors: Vec<Lanes<f64>>,
     /// Weights.
     weights: Vec<f64>,
     /// Weighted squared distances of all rows.
@@ -70,25 +70,33 @@ impl pulp::WithSimd for Chunk<'_> {
     type Output = Sums;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Sums {
-        let Self { search, weights } = self;
-        let Search { words, rows, sketches, indices, distances } = search;
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> Sums {
+        let Self { mut search, weights } = self;
+        let computed = search.run(simd);
+        let Search { words, rows, indices, .. } = search;
         let (width, count) = (words.width, words.len());
-        let inner = Search { words, rows, sketches, indices, distances };
-        let computed = inner.run();
         let mut sums = Sums {
-            vectors: vec![0.0; count * width],
+            vectors: vec![Lanes([0.0; LANES]); count * width],
             weights: vec![0.0; count],
             error: 0.0,
             computed,
         };
+        // Lane by lane over all rows: a sum for each row would have to be folded.
+        let mut errors = [0f64; LANES];
         for ((row, &index), &weight) in rows.chunks_exact(width).zip(&*indices).zip(weights) {
             let index = index as usize;
             sums.weights[index] += weight;
-            sums.error += weight * squared_f64(row, words.word(index));
             let to = &mut sums.vectors[index * width..][..width];
-            to.iter_mut().zip(row).for_each(|(to, &v)| *to += weight * f64::from(v));
+            for ((to, row), word) in to.iter_mut().zip(row).zip(words.word(index)) {
+                for (l, error) in errors.iter_mut().enumerate() {
+                    let v = f64::from(row.0[l]);
+                    let d = v - f64::from(word.0[l]);
+                    *error += weight * (d * d);
+                    to.0[l] += weight * v;
+                }
+            }
         }
+        sums.error = errors.iter().sum();
         sums
     }
 }
@@ -112,7 +120,9 @@ impl Assignment {
         let mut parts = parts.into_iter();
         let mut all = parts.next().expect("a sample is not empty");
         for part in parts {
-            all.vectors.iter_mut().zip(&part.vectors).for_each(|(a, b)| *a += b);
+            for (a, b) in all.vectors.iter_mut().zip(&part.vectors) {
+                a.0.iter_mut().zip(&b.0).for_each(|(a, b)| *a += b);
+            }
             all.weights.iter_mut().zip(&part.weights).for_each(|(a, b)| *a += b);
             all.error += part.error;
             all.computed += part.computed;
@@ -122,7 +132,7 @@ impl Assignment {
 
     /// The means of the words' rows, padded. Words without rows move to the rows that add most to
     /// the distortion: each lowers it by as much.
-    pub(crate) fn means(&self, sample: Sample, sums: &Sums, words: &Words) -> Vec<f32> {
+    pub(crate) fn means(&self, sample: Sample, sums: &Sums, words: &Words) -> Vec<Lanes> {
         let width = words.width;
         let mut values = words.values.clone();
         let mut unused = Vec::new();
@@ -130,7 +140,9 @@ impl Assignment {
             let weight = sums.weights[w];
             if weight > 0.0 {
                 let sum = &sums.vectors[w * width..][..width];
-                word.iter_mut().zip(sum).for_each(|(v, s)| *v = (s / weight) as f32);
+                for (word, sum) in word.iter_mut().zip(sum) {
+                    *word = Lanes(sum.0.map(|s| (s / weight) as f32));
+                }
             } else {
                 unused.push(w);
             }
@@ -149,7 +161,7 @@ impl Assignment {
 
     /// Moves each mean to the nearest of its rows, the first of several (paper 004, section 4.1.2).
     /// Returns the distances that were computed.
-    pub(crate) fn snap(&self, sample: Sample, means: &mut [f32]) -> u64 {
+    pub(crate) fn snap(&self, sample: Sample, means: &mut [Lanes]) -> u64 {
         let width = sample.rows.width;
         let count = means.len() / width;
         let chunk = sample.chunk(count);
@@ -177,8 +189,8 @@ impl Assignment {
 /// For each word, the squared distance and number of the row of a chunk that is nearest to its mean;
 /// infinite without rows. For `pulp`.
 struct NearestRows<'a> {
-    means: &'a [f32],
-    rows: &'a [f32],
+    means: &'a [Lanes],
+    rows: &'a [Lanes],
     indices: &'a [u32],
     width: usize,
 }
@@ -187,12 +199,12 @@ impl pulp::WithSimd for NearestRows<'_> {
     type Output = Vec<(f32, u32)>;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> Self::Output {
         let Self { means, rows, indices, width } = self;
         let mut nearest = vec![(f32::INFINITY, 0); means.len() / width];
         for ((i, row), &index) in (0..).zip(rows.chunks_exact(width)).zip(indices) {
             let index = index as usize;
-            let distance = squared(row, &means[index * width..][..width]);
+            let distance = squared(simd, row, &means[index * width..][..width]);
             if distance < nearest[index].0 {
                 nearest[index] = (distance, i);
             }

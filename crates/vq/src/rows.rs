@@ -1,6 +1,6 @@
 //! The distinct vectors, shuffled: a sample of them is a prefix.
 
-use crate::distance::LANES;
+use crate::distance::{LANES, Lanes, pad};
 use crate::vectors::Vectors;
 use hashbrown::HashTable;
 use rand::{RngExt, SeedableRng};
@@ -9,18 +9,18 @@ use rayon::prelude::*;
 
 /// Padded vectors, one after the other.
 pub(crate) struct Rows {
-    /// Numbers of a row: the dimension, padded to whole lanes.
+    /// Lanes of a row.
     pub(crate) width: usize,
-    pub(crate) values: Vec<f32>,
+    pub(crate) values: Vec<Lanes>,
 }
 
 impl Rows {
     /// The vectors `which` of `vectors`.
     pub(crate) fn gather(vectors: &Vectors, which: &[u32]) -> Self {
-        let width = vectors.dimension().next_multiple_of(LANES);
-        let mut values = vec![0.0; which.len() * width];
+        let width = vectors.dimension().div_ceil(LANES);
+        let mut values = vec![Lanes([0.0; LANES]); which.len() * width];
         values.par_chunks_mut(width).zip(which).with_min_len(1024).for_each(|(to, &i)| {
-            to[..vectors.dimension()].copy_from_slice(vectors.row(i as usize));
+            to.iter_mut().zip(pad(vectors.row(i as usize))).for_each(|(to, lanes)| *to = lanes);
         });
         Self { width, values }
     }
@@ -30,7 +30,7 @@ impl Rows {
     }
 
     #[inline(always)]
-    pub(crate) fn row(&self, i: usize) -> &[f32] {
+    pub(crate) fn row(&self, i: usize) -> &[Lanes] {
         &self.values[i * self.width..][..self.width]
     }
 }

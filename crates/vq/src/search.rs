@@ -1,23 +1,21 @@
 //! The nearest word of each of many vectors, exactly.
 //!
-//! A first guess gives a distance; words whose bound (see [`crate::sketch`]) is above it are ruled
-//! out sixteen at a time, and distances are computed to the few that are left.
+//! A first guess gives a distance. Blocks of sixteen words whose box (see [`crate::sketch`]) is
+//! farther are ruled out sixteen at a time, then the words of those that are left; distances are
+//! computed to the one or two words that remain.
 
-use crate::distance::{LANES, squared};
+use crate::distance::{LANES, Lanes, squared};
 use crate::sketch::Sketch;
-use crate::words::{Words, bounds, limit, square};
+use crate::words::{Words, bounds, box_bounds, limit, square};
+use pulp::Simd;
 
 /// No guess.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Vectors whose bounds are computed together.
-const ROWS: usize = 4;
-
 /// A search among `words` for a chunk of vectors.
 pub(crate) struct Search<'a> {
     pub(crate) words: &'a Words,
-    /// Padded.
-    pub(crate) rows: &'a [f32],
+    pub(crate) rows: &'a [Lanes],
     pub(crate) sketches: &'a [Sketch],
     /// In: a guess or [`NONE`]. Out: the nearest word, the lowest of several.
     pub(crate) indices: &'a mut [u32],
@@ -28,88 +26,55 @@ pub(crate) struct Search<'a> {
 impl Search<'_> {
     /// Distances that were computed.
     #[inline(always)]
-    pub(crate) fn run(self) -> u64 {
-        let blocks = &self.words.sketches.blocks;
-        let mut buffer = vec![[[0f32; LANES]; ROWS]; blocks.len()];
+    pub(crate) fn run<S: Simd>(&mut self, simd: S) -> u64 {
         let mut computed = 0;
-        let width = self.words.width;
-        for (group, sketches) in self.sketches.chunks(ROWS).enumerate() {
-            let padded = std::array::from_fn(|r| sketches[r.min(sketches.len() - 1)]);
-            bounds(blocks, &padded, &mut buffer);
-            for (r, sketch) in sketches.iter().enumerate() {
-                let i = group * ROWS + r;
-                let row = &self.rows[i * width..][..width];
-                let guess = self.indices[i];
-                let guess = if guess == NONE { lowest(&buffer, r) } else { guess };
-                let (index, distance, more) = nearest(self.words, row, sketch, guess, &buffer, r);
-                self.indices[i] = index;
-                self.distances[i] = distance;
-                computed += more;
-            }
+        for (i, row) in self.rows.chunks_exact(self.words.width).enumerate() {
+            let found = nearest(simd, self.words, row, &self.sketches[i], self.indices[i]);
+            (self.indices[i], self.distances[i]) = (found.0, found.1);
+            computed += found.2;
         }
         computed
     }
 }
 
-/// The word with the lowest bound of vector `r`.
-#[inline(always)]
-fn lowest(buffer: &[[[f32; LANES]; ROWS]], r: usize) -> u32 {
-    let mut least = [f32::INFINITY; LANES];
-    let mut at = [0u32; LANES];
-    for (b, bounds) in (0..).zip(buffer) {
-        for l in 0..LANES {
-            let below = bounds[r][l] < least[l];
-            least[l] = if below { bounds[r][l] } else { least[l] };
-            at[l] = if below { b } else { at[l] };
-        }
+impl pulp::WithSimd for Search<'_> {
+    type Output = u64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) -> u64 {
+        self.run(simd)
     }
-    let mut best = 0;
-    for l in 1..LANES {
-        if least[l] < least[best] {
-            best = l;
-        }
-    }
-    at[best] * LANES as u32 + best as u32
 }
 
 /// The nearest word, its squared distance, and the distances that were computed.
 #[inline(always)]
-fn nearest(
+fn nearest<S: Simd>(
+    simd: S,
     words: &Words,
-    row: &[f32],
+    row: &[Lanes],
     sketch: &Sketch,
     guess: u32,
-    buffer: &[[[f32; LANES]; ROWS]],
-    r: usize,
 ) -> (u32, f32, u64) {
-    let (mut index, mut distance) = (guess, squared(row, words.word(guess as usize)));
-    let (own, reach) = (square(sketch), words.sketches.reach);
-    let limit_of = |distance| limit(distance, row.len(), own, reach);
-    let mut most = limit_of(distance);
-    // Mostly the guess alone is left.
-    let mut left = [0u32; LANES];
-    for bounds in buffer {
-        for l in 0..LANES {
-            left[l] += u32::from(bounds[r][l] <= most);
-        }
-    }
+    let twice = sketch.map(|v| -2.0 * v);
+    let guess = if guess == NONE { near(simd, words, sketch, &twice) } else { guess };
+    let (mut index, mut distance) = (guess, squared(simd, row, words.word(guess as usize)));
+    let (own, reach) = (square(sketch), words.gathered.sketches.reach);
+    let mut most = limit(distance, row.len(), own, reach);
     let mut computed = 1;
-    if left.iter().sum::<u32>() > 1 {
-        for (b, bounds) in buffer.iter().enumerate() {
-            let bounds = &bounds[r];
-            if bounds.iter().map(|v| u32::from(*v <= most)).sum::<u32>() == 0 {
-                continue;
-            }
-            for (l, &bound) in bounds.iter().enumerate() {
-                let word = (b * LANES + l) as u32;
-                if bound > most || word == guess {
+    for (first, boxes) in (0..).step_by(LANES).zip(&words.gathered.boxes) {
+        for l in Bits(box_bounds(simd, boxes, sketch).at_most(simd, most)) {
+            let b = first + l;
+            let bounds = bounds(simd, &words.gathered.sketches.blocks[b], &twice);
+            for l in Bits(bounds.at_most(simd, most - own)) {
+                let word = words.gathered.numbers[b * LANES + l];
+                if word == guess {
                     continue;
                 }
-                let other = squared(row, words.word(word as usize));
+                let other = squared(simd, row, words.word(word as usize));
                 computed += 1;
                 if other < distance || (other == distance && word < index) {
                     (index, distance) = (word, other);
-                    most = limit_of(distance);
+                    most = limit(distance, row.len(), own, reach);
                 }
             }
         }
@@ -117,11 +82,42 @@ fn nearest(
     (index, distance, computed)
 }
 
-impl pulp::WithSimd for Search<'_> {
-    type Output = u64;
+/// The bits that are set, from the lowest.
+pub(crate) struct Bits(pub(crate) u32);
+
+impl Iterator for Bits {
+    type Item = usize;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> u64 {
-        self.run()
+    fn next(&mut self) -> Option<usize> {
+        let lowest = self.0.trailing_zeros();
+        self.0 &= self.0.wrapping_sub(1);
+        (lowest < u32::BITS).then_some(lowest as usize)
     }
+}
+
+/// A word that is likely to be near: the one with the lowest bound in the block with the nearest box.
+#[inline(always)]
+fn near<S: Simd>(simd: S, words: &Words, sketch: &Sketch, twice: &Sketch) -> u32 {
+    let (mut least, mut block) = (f32::INFINITY, 0);
+    for (b, boxes) in words.gathered.boxes.iter().enumerate() {
+        let (l, bound) = lowest(&box_bounds(simd, boxes, sketch).lanes());
+        if bound < least {
+            (least, block) = (bound, b * LANES + l);
+        }
+    }
+    let (l, _) = lowest(&bounds(simd, &words.gathered.sketches.blocks[block], twice).lanes());
+    words.gathered.numbers[block * LANES + l]
+}
+
+/// The first lowest, and its place.
+#[inline(always)]
+fn lowest(values: &Lanes) -> (usize, f32) {
+    let mut best = 0;
+    for l in 1..LANES {
+        if values.0[l] < values.0[best] {
+            best = l;
+        }
+    }
+    (best, values.0[best])
 }

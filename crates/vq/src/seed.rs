@@ -1,8 +1,9 @@
 //! The words that training starts from.
 
-use crate::distance::{LANES, squared};
+use crate::distance::{LANES, Lanes, squared};
 use crate::lloyd::Sample;
-use crate::words::{Blocks, bounds, limit, square};
+use crate::search::Bits;
+use crate::words::{Gathered, bounds, box_bounds, limit, square};
 use rand::RngExt;
 use rand_pcg::Pcg32;
 
@@ -13,8 +14,8 @@ const DRAWS: usize = 4;
 /// `words` rows, each drawn by its squared distance from those before it, and the distances that
 /// were computed. Rows are distinct and no fewer than `words`.
 pub(crate) fn plus_plus(sample: Sample, words: usize, random: &mut Pcg32) -> (Vec<u32>, u64) {
-    let blocks = Blocks::new(&sample.sketches[..sample.len()]);
-    let mut state = State::new(sample, &blocks);
+    let gathered = Gathered::new(&sample.sketches[..sample.len()]);
+    let mut state = State::new(sample, &gathered);
     let mut chosen = vec![false; sample.len()];
     let mut order = Vec::with_capacity(words);
     let mut trials: [Trial; DRAWS] = Default::default();
@@ -44,11 +45,14 @@ pub(crate) fn plus_plus(sample: Sample, words: usize, random: &mut Pcg32) -> (Ve
     (order, state.computed)
 }
 
+/// Rows are counted by their place in the blocks.
 struct State<'a> {
     sample: Sample<'a>,
-    blocks: &'a Blocks,
+    gathered: &'a Gathered,
     /// Squared distance of each row to the nearest word so far, in blocks; 0 behind the last row.
     nearest: Vec<[f32; LANES]>,
+    /// The largest of each block, by sixteen.
+    farthest: Vec<Lanes>,
     /// What the rows of each block add to the distortion.
     errors: Vec<f64>,
     computed: u64,
@@ -60,27 +64,42 @@ struct Trial {
     row: u32,
     /// By how much the distortion falls.
     gain: f64,
-    /// Rows that come nearer, and their squared distances.
+    /// Places of rows that come nearer, and their squared distances.
     nearer: Vec<(u32, f32)>,
     computed: u64,
 }
 
 impl<'a> State<'a> {
-    fn new(sample: Sample<'a>, blocks: &'a Blocks) -> Self {
+    fn new(sample: Sample<'a>, gathered: &'a Gathered) -> Self {
         // Before the first word all rows are equally far.
         let count = sample.len();
+        let blocks = count.div_ceil(LANES);
         let far =
             |b: usize| std::array::from_fn(|l| if b * LANES + l < count { f32::MAX } else { 0.0 });
-        let nearest = (0..blocks.blocks.len()).map(far).collect();
-        let errors = sample.weights.chunks(LANES).map(|w| w.iter().sum()).collect();
-        Self { sample, blocks, nearest, errors, computed: 0 }
+        let nearest = (0..blocks).map(far).collect();
+        let farthest = vec![Lanes([0.0; LANES]); blocks.div_ceil(LANES)];
+        let mut state =
+            Self { sample, gathered, nearest, farthest, errors: vec![0.0; blocks], computed: 0 };
+        (0..blocks).for_each(|b| state.update(b));
+        state
     }
 
-    /// What row `i` adds to the distortion.
-    fn error(&self, i: usize) -> f64 {
-        let nearest = self.nearest[i / LANES][i % LANES];
+    fn row(&self, place: usize) -> u32 {
+        self.gathered.numbers[place]
+    }
+
+    /// What the row at a place adds to the distortion.
+    fn error(&self, place: usize) -> f64 {
+        let nearest = self.nearest[place / LANES][place % LANES];
         let nearest = if nearest == f32::MAX { 1.0 } else { f64::from(nearest) };
-        nearest * self.sample.weights[i]
+        nearest * self.sample.weights[self.row(place) as usize]
+    }
+
+    /// Sums up a block.
+    fn update(&mut self, b: usize) {
+        let places = b * LANES..self.sample.len().min((b + 1) * LANES);
+        self.errors[b] = places.map(|i| self.error(i)).sum();
+        self.farthest[b / LANES].0[b % LANES] = self.nearest[b].into_iter().fold(0.0, f32::max);
     }
 
     /// A row, drawn by what it adds; `None` if none adds anything.
@@ -97,7 +116,7 @@ impl<'a> State<'a> {
             for i in b * LANES..self.sample.len().min((b + 1) * LANES) {
                 let error = self.error(i);
                 if error > 0.0 {
-                    last = Some(i as u32);
+                    last = Some(self.row(i));
                     if left < error {
                         return last;
                     }
@@ -108,21 +127,16 @@ impl<'a> State<'a> {
                 return last;
             }
         }
-        (0..self.sample.len()).rev().find(|&i| self.error(i) > 0.0).map(|i| i as u32)
+        (0..self.sample.len()).rev().find(|&i| self.error(i) > 0.0).map(|i| self.row(i))
     }
 
     fn take(&mut self, trial: &Trial) {
         for &(i, distance) in &trial.nearer {
             self.nearest[i as usize / LANES][i as usize % LANES] = distance;
         }
-        let mut before = usize::MAX;
-        for &(i, _) in &trial.nearer {
-            let b = i as usize / LANES;
-            if b != before {
-                let rows = b * LANES..self.sample.len().min((b + 1) * LANES);
-                self.errors[b] = rows.map(|i| self.error(i)).sum();
-                before = b;
-            }
+        // Places ascend.
+        for same in trial.nearer.chunk_by(|a, b| a.0 as usize / LANES == b.0 as usize / LANES) {
+            self.update(same[0].0 as usize / LANES);
         }
     }
 }
@@ -137,7 +151,7 @@ impl pulp::WithSimd for Try<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let Self { state, trial } = self;
         let sample = state.sample;
         let sketch = sample.sketches[trial.row as usize];
@@ -145,32 +159,38 @@ impl pulp::WithSimd for Try<'_> {
         trial.nearer.clear();
         (trial.gain, trial.computed) = (0.0, 0);
         // What `limit` adds at distance 0, and what it multiplies distances by.
-        let (own, reach) = (square(&sketch), state.blocks.reach);
+        let (own, reach) = (square(&sketch), state.gathered.sketches.reach);
         let more = limit(0.0, word.len(), own, reach);
         let factor = limit(1.0, word.len(), 0.0, 0.0);
-        for (b, (block, nearest)) in state.blocks.blocks.iter().zip(&state.nearest).enumerate() {
-            let mut out = [[[0f32; LANES]; 1]];
-            bounds(std::slice::from_ref(block), &[sketch], &mut out);
-            let bounds = out[0][0];
-            let mut left = [0u32; LANES];
-            for l in 0..LANES {
-                left[l] = u32::from(bounds[l] <= nearest[l] * factor + more);
-            }
-            if left.iter().sum::<u32>() == 0 {
-                continue;
-            }
-            for l in 0..LANES {
-                let i = b * LANES + l;
-                if left[l] == 0 || i >= sample.len() {
-                    continue;
-                }
-                let distance = squared(sample.rows.row(i), word);
-                trial.computed += 1;
-                if distance < nearest[l] {
-                    trial.gain += state.error(i) - f64::from(distance) * sample.weights[i];
-                    trial.nearer.push((i as u32, distance));
+        let twice = sketch.map(|v| -2.0 * v);
+        let boxes = state.gathered.boxes.iter().zip(&state.farthest);
+        for (first, (boxes, farthest)) in (0..).step_by(LANES).zip(boxes) {
+            let bounds = box_bounds(simd, boxes, &sketch).lanes();
+            for b in Bits(at_most(&bounds.0, &farthest.0, factor, more)) {
+                let (b, nearest) = (first + b, &state.nearest[first + b]);
+                let bounds = self::bounds(simd, &state.gathered.sketches.blocks[b], &twice).lanes();
+                for l in Bits(at_most(&bounds.0, nearest, factor, more - own)) {
+                    let place = b * LANES + l;
+                    let row = state.row(place) as usize;
+                    let distance = squared(simd, sample.rows.row(row), word);
+                    trial.computed += 1;
+                    if distance < nearest[l] {
+                        let now = f64::from(distance) * sample.weights[row];
+                        trial.gain += state.error(place) - now;
+                        trial.nearer.push((place as u32, distance));
+                    }
                 }
             }
         }
     }
+}
+
+/// Bit `l` says whether bound `l` is at most the distance `l`, times `factor` and `more`.
+#[inline(always)]
+fn at_most(bounds: &[f32; LANES], distances: &[f32; LANES], factor: f32, more: f32) -> u32 {
+    let mut bits = 0;
+    for l in 0..LANES {
+        bits |= if bounds[l] <= distances[l] * factor + more { 1 << l } else { 0 };
+    }
+    bits
 }

@@ -5,7 +5,7 @@
 //! of two sketches bounds the distance of their vectors from below. Neighbouring texels are alike:
 //! of 512 words, on average less than two are not ruled out so.
 
-use crate::distance::LANES;
+use crate::distance::{LANES, Lanes};
 use crate::rows::Rows;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
@@ -33,10 +33,10 @@ pub(crate) struct Sketcher {
 impl Sketcher {
     /// For vectors like the first `count` of `rows`.
     pub(crate) fn new(rows: &Rows, count: usize) -> Self {
-        let (width, count) = (rows.width, count.min(SAMPLE));
+        let (width, count) = (rows.width * LANES, count.min(SAMPLE));
         let mut mean = vec![0f64; width];
         for i in 0..count {
-            mean.iter_mut().zip(rows.row(i)).for_each(|(m, &v)| *m += f64::from(v));
+            mean.iter_mut().zip(numbers(rows.row(i))).for_each(|(m, v)| *m += v);
         }
         mean.iter_mut().for_each(|m| *m /= count.max(1) as f64);
         let mut sketcher = Self { mean, directions: vec![[0.0; PARTS]; width] };
@@ -76,11 +76,11 @@ impl Sketcher {
 
     /// The sketch of a padded vector.
     #[inline(always)]
-    fn sketch(&self, row: &[f32]) -> Sketch {
+    fn sketch(&self, row: &[Lanes]) -> Sketch {
         let mut parts = [0f64; PARTS];
         let mut square = 0f64;
-        for ((&v, m), directions) in row.iter().zip(&self.mean).zip(&self.directions) {
-            let v = f64::from(v) - m;
+        for ((v, m), directions) in numbers(row).zip(&self.mean).zip(&self.directions) {
+            let v = v - m;
             square += v * v;
             for j in 0..PARTS {
                 parts[j] += v * directions[j];
@@ -92,14 +92,20 @@ impl Sketcher {
     }
 
     /// The sketches of padded vectors, one after the other.
-    pub(crate) fn sketches(&self, values: &[f32]) -> Vec<Sketch> {
-        let width = self.mean.len();
+    pub(crate) fn sketches(&self, values: &[Lanes]) -> Vec<Sketch> {
+        let width = self.mean.len() / LANES;
         let mut out = vec![[0.0; PARTS]; values.len() / width];
         out.par_chunks_mut(1024).zip(values.par_chunks(1024 * width)).for_each(|(out, values)| {
             pulp::Arch::new().dispatch(SketchAll { sketcher: self, values, out });
         });
         out
     }
+}
+
+/// The numbers of a padded vector.
+#[inline(always)]
+fn numbers(row: &[Lanes]) -> impl Iterator<Item = f64> {
+    row.iter().flat_map(|lanes| lanes.0).map(f64::from)
 }
 
 /// Columns of almost nothing become 0: bounds hold with fewer directions too.
@@ -132,11 +138,11 @@ impl pulp::WithSimd for Covariance<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let width = self.rows.width;
+        let width = self.rows.width * LANES;
         let mut centred = vec![0f64; width];
         for i in 0..self.count {
-            for ((c, &v), m) in centred.iter_mut().zip(self.rows.row(i)).zip(self.mean) {
-                *c = f64::from(v) - m;
+            for ((c, v), m) in centred.iter_mut().zip(numbers(self.rows.row(i))).zip(self.mean) {
+                *c = v - m;
             }
             for (a, out) in centred.iter().zip(self.out.chunks_exact_mut(width)) {
                 let out = out.as_chunks_mut::<LANES>().0;
@@ -153,7 +159,7 @@ impl pulp::WithSimd for Covariance<'_> {
 /// [`Sketcher::sketch`] of many, for `pulp`.
 struct SketchAll<'a> {
     sketcher: &'a Sketcher,
-    values: &'a [f32],
+    values: &'a [Lanes],
     out: &'a mut [Sketch],
 }
 
@@ -162,7 +168,7 @@ impl pulp::WithSimd for SketchAll<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let width = self.sketcher.mean.len();
+        let width = self.sketcher.mean.len() / LANES;
         for (out, row) in self.out.iter_mut().zip(self.values.chunks_exact(width)) {
             *out = self.sketcher.sketch(row);
         }

@@ -1,6 +1,7 @@
 //! From vectors to a codebook.
 
 use crate::codebook::Codebook;
+use crate::distance::Lanes;
 use crate::error::VqError;
 use crate::lloyd::{Assignment, Sample};
 use crate::options::{Centers, Seeding, TrainOptions};
@@ -30,11 +31,14 @@ pub struct Training {
     pub distances: u64,
 }
 
-/// Rows of the smallest sample, for each word.
-const SAMPLE_ROWS: usize = 16;
+// Measured with 150,000 blocks of leaf and bark textures in CIELab and 512 words: smaller samples
+// start sooner, but end in worse words.
+
+/// Rows of the smallest sample, for each word, at least.
+const SAMPLE_ROWS: usize = 64;
 
 /// How many times larger the next sample is.
-const SAMPLE_STEP: usize = 4;
+const SAMPLE_STEP: usize = 2;
 
 /// Rounds over a sample at most.
 const SAMPLE_ROUNDS: usize = 8;
@@ -45,7 +49,7 @@ const SAMPLE_TOLERANCE: f64 = 4e-3;
 /// Trains a codebook. `weights` are one a vector, finite and ≥ 0, not all 0; none are all 1. Equal
 /// vectors are merged first.
 ///
-/// Rounds over a sample of the vectors, then over a larger one, come before rounds over all of them:
+/// Rounds over a sample of the vectors, then over larger ones, come before rounds over all of them:
 /// means of a sample are nearly those of all. Results are the same on any machine, with any number of
 /// threads.
 ///
@@ -74,7 +78,8 @@ pub fn train(
     indices.truncate(heavy);
     indices.extend(crate::assign::nearest(&run.best.words, &light.values, &run.sketcher));
     let dimension = vectors.dimension();
-    let words = run.best.words.values.chunks_exact(width).flat_map(|w| &w[..dimension]).copied();
+    let words = run.best.words.values.chunks_exact(width);
+    let words = words.flat_map(|w| w.iter().flat_map(|lanes| lanes.0).take(dimension));
     Ok(Training {
         codebook: Codebook::new(dimension, words.collect())?,
         indices: distinct.row_of.iter().map(|&r| indices[r as usize]).collect(),
@@ -136,7 +141,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn words(&self, values: Vec<f32>) -> Words {
+    fn words(&self, values: Vec<Lanes>) -> Words {
         Words::new(self.distinct.rows.width, values, &self.sketcher)
     }
 

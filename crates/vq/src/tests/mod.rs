@@ -4,7 +4,7 @@ mod search;
 mod training;
 
 use crate::Vectors;
-use crate::distance::{LANES, squared};
+use crate::distance::{Lanes, pad, squared};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -25,17 +25,12 @@ fn clumps(count: usize, dimension: usize, seed: u64) -> Vectors {
 /// The nearest word of each vector, by all distances; the lowest of several.
 fn brute_force(words: &[f32], vectors: &Vectors) -> Vec<u32> {
     let dimension = vectors.dimension();
-    let pad = |v: &[f32]| {
-        let mut v = v.to_vec();
-        v.resize(dimension.next_multiple_of(LANES), 0.0);
-        v
-    };
-    let words: Vec<Vec<f32>> = words.chunks_exact(dimension).map(pad).collect();
+    let words: Vec<Vec<Lanes>> = words.chunks_exact(dimension).map(|w| pad(w).collect()).collect();
     let nearest = |i| {
-        let row = pad(vectors.row(i));
+        let row: Vec<Lanes> = pad(vectors.row(i)).collect();
         let (mut index, mut least) = (0, f32::INFINITY);
         for (w, word) in (0..).zip(&words) {
-            let distance = squared(&row, word);
+            let distance = squared(pulp::Scalar::new(), &row, word);
             if distance < least {
                 (index, least) = (w, distance);
             }

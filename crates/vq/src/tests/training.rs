@@ -50,8 +50,8 @@ fn check(vectors: &Vectors, weights: Option<&[f32]>, centers: Centers, t: &Train
 
 #[test]
 fn all_kinds_keep_the_rules() {
-    // With samples (3000 rows for 20 words) and without.
-    for (count, dimension, codewords) in [(3000, 48, 20), (700, 16, 100), (400, 3, 1)] {
+    // With samples (4000 rows for 20 words) and without.
+    for (count, dimension, codewords) in [(4000, 48, 20), (700, 16, 100), (400, 3, 1)] {
         let vectors = clumps(count, dimension, 3);
         let weights: Vec<f32> = (0..count).map(|i| (i % 5) as f32).collect();
         for kind in ALL {
