@@ -52,8 +52,9 @@ struct Found {
 /// Rays that must reach a texel; what lacks is made up by the cell's mean opacity.
 const LEAST_REACH: f32 = 0.5;
 
-/// Rays along the side of a texel of coarser levels.
-const RAYS_A_TEXEL: f64 = 4.0;
+/// Rays along the side of a texel: of the finest level, and of coarser ones, which have more to
+/// show. Billboards are wider than their cells; there are up to three times as many.
+const RAYS_A_TEXEL: [f64; 2] = [1.5, 2.0];
 
 /// Light that is not followed any more in a photograph.
 const DARK: f32 = 1.0 / 256.0;
@@ -141,7 +142,7 @@ impl Rays<'_> {
         let [columns, rows] = camera.size.map(|n| (f64::from(n) / step) as u32);
         let finder = TexelFinder::new(self.frame, self.options.texels);
         let mut met: Vec<(u32, f32)> = Vec::new();
-        for (row, column) in (0..rows).flat_map(|r| (0..columns).map(move |c| (r, c))) {
+        for [column, row] in tiled(columns, rows) {
             let [x, y] = [column, row].map(|i| (f64::from(i) + 0.5) * step);
             let Some((origin, direction)) = camera.ray(x, y) else { continue };
             let ray = LocalRay { origin: self.lattice.local(level, origin), direction };
@@ -194,7 +195,7 @@ impl Rays<'_> {
         let camera = &self.shot.camera;
         let depth = (self.lattice.middle() - camera.eye).dot(camera.forward);
         let pixels = texel * camera.pixels_per_area(depth.max(0.1 * self.lattice.side)).sqrt();
-        let rays = if level == self.lattice.levels { 1.5 } else { RAYS_A_TEXEL };
+        let rays = RAYS_A_TEXEL[usize::from(level < self.lattice.levels)];
         // Pictures are neither enlarged more than fourfold nor walked in less than 16 rays.
         let least = f64::from(camera.size[0].min(camera.size[1])) / 16.0;
         // Whole pixels keep rays in the middle of pixels.
@@ -225,6 +226,17 @@ impl Rays<'_> {
         }
         out
     }
+}
+
+/// All places of a grid, square by square: neighbouring rays meet the same cells.
+fn tiled(columns: u32, rows: u32) -> impl Iterator<Item = [u32; 2]> {
+    const TILE: u32 = 16;
+    let starts = |n: u32| (0..n).step_by(TILE as usize);
+    let corners = starts(rows).flat_map(move |y| starts(columns).map(move |x| [x, y]));
+    corners.flat_map(move |[x0, y0]| {
+        let xs = x0..(x0 + TILE).min(columns);
+        (y0..(y0 + TILE).min(rows)).flat_map(move |y| xs.clone().map(move |x| [x, y]))
+    })
 }
 
 /// Pixels that a square world unit about `at` covers.

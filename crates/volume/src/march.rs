@@ -14,9 +14,9 @@ pub(crate) struct LocalRay {
 /// Calls `visit` with the number of each occupied cell that the ray meets from the distance `from`
 /// on, in order, and where it enters and leaves the cell; until `visit` says `false`.
 ///
-/// Steps go from cell to cell, or from brick to brick where nothing is (J. Amanatides, A. Woo, "A
-/// fast voxel traversal algorithm for ray tracing", 1987); where a step leads is computed from
-/// the ray's start each time, so that errors do not add up.
+/// Steps go from cell to cell, or over bricks where nothing is (J. Amanatides, A. Woo, "A fast voxel
+/// traversal algorithm for ray tracing", 1987). In each brick distances are computed anew from the
+/// ray's start, so that errors do not add up.
 #[inline]
 pub(crate) fn walk(
     cells: &Cells,
@@ -24,60 +24,127 @@ pub(crate) fn walk(
     from: f64,
     mut visit: impl FnMut(u32, f64, f64) -> bool,
 ) {
-    let n = f64::from(cells.n);
-    let inverse = ray.direction.recip();
-    // Where the ray is within the lattice. A ray along a face is inside where 0·∞ says nothing.
-    let (mut enter, mut leave) = (from, f64::INFINITY);
-    for k in 0..3 {
-        if ray.direction[k] == 0.0 {
-            if !(0.0..n).contains(&ray.origin[k]) {
+    let Some(mut at) = Traversal::start(cells.n, ray, from) else { return };
+    loop {
+        if !cells.has_brick(at.place.as_uvec3()) {
+            if !at.skip_brick() {
                 return;
             }
             continue;
         }
-        let (a, b) = (-ray.origin[k] * inverse[k], (n - ray.origin[k]) * inverse[k]);
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
-    }
-    if enter >= leave {
-        return;
-    }
-    let last = cells.n as i32 - 1;
-    let start = ray.origin + ray.direction * enter;
-    let mut place = start.floor().as_ivec3().clamp(IVec3::ZERO, IVec3::splat(last));
-    let mut t = enter;
-    loop {
-        let at = place.as_uvec3();
-        let size = if cells.has_brick(at) { 1 } else { BRICK as i32 };
-        let low = place / size * size;
-        let mut exit = (f64::INFINITY, 0);
-        for k in 0..3 {
-            if ray.direction[k] != 0.0 {
-                let wall = low[k] + if ray.direction[k] > 0.0 { size } else { 0 };
-                let t = (f64::from(wall) - ray.origin[k]) * inverse[k];
-                if t < exit.0 {
-                    exit = (t, k);
-                }
-            }
-        }
-        let (end, axis) = exit;
-        if size == 1 {
-            let cell = cells.at(at);
-            if cell != NONE && end > t && !visit(cell, t, end.min(leave)) {
+        let brick = at.place / BRICK as i32;
+        let mut walls = at.walls();
+        loop {
+            let (end, axis) = nearest(walls);
+            let cell = cells.at(at.place.as_uvec3());
+            if cell != NONE && end > at.t && !visit(cell, at.t, end.min(at.leave)) {
                 return;
             }
+            // Rounding may put the wall behind: the step is made all the same.
+            at.t = at.t.max(end);
+            at.place[axis] += at.step[axis];
+            walls[axis] += at.width[axis];
+            if at.place[axis] < 0 || at.place[axis] > at.last {
+                return;
+            }
+            if at.place[axis] / BRICK as i32 != brick[axis] {
+                break;
+            }
         }
-        // Rounding may put the wall behind: the step is made all the same.
-        t = t.max(end);
-        let next = if ray.direction[axis] > 0.0 { low[axis] + size } else { low[axis] - 1 };
-        if next < 0 || next > last {
-            return;
+    }
+}
+
+/// The smallest of three, and which it is.
+#[inline]
+fn nearest([x, y, z]: [f64; 3]) -> (f64, usize) {
+    if x < y {
+        if x < z { (x, 0) } else { (z, 2) }
+    } else if y < z {
+        (y, 1)
+    } else {
+        (z, 2)
+    }
+}
+
+/// A ray on its way.
+struct Traversal<'a> {
+    ray: &'a LocalRay,
+    inverse: [f64; 3],
+    /// Cell that it is in.
+    place: IVec3,
+    /// Where it entered the cell.
+    t: f64,
+    /// Where it leaves the lattice.
+    leave: f64,
+    /// The last cell along each axis.
+    last: i32,
+    /// To the next cell along each axis: 1 or −1, and the way between two walls.
+    step: [i32; 3],
+    width: [f64; 3],
+}
+
+impl<'a> Traversal<'a> {
+    /// Where the ray enters a lattice of `n` cells a side; `None` if it does not.
+    #[inline]
+    fn start(n: u32, ray: &'a LocalRay, from: f64) -> Option<Self> {
+        let (end, inverse) = (f64::from(n), ray.direction.recip().to_array());
+        let (mut enter, mut leave) = (from, f64::INFINITY);
+        for k in 0..3 {
+            // Along a face 0·∞ would say nothing.
+            if ray.direction[k] == 0.0 {
+                if !(0.0..end).contains(&ray.origin[k]) {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = (-ray.origin[k] * inverse[k], (end - ray.origin[k]) * inverse[k]);
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
         }
-        if size > 1 {
-            let here = (ray.origin + ray.direction * t).floor().as_ivec3();
-            place = here.clamp(low, (low + (size - 1)).min(IVec3::splat(last)));
+        if enter >= leave {
+            return None;
         }
-        place[axis] = next;
+        let last = n as i32 - 1;
+        let start = ray.origin + ray.direction * enter;
+        Some(Self {
+            ray,
+            inverse,
+            place: start.floor().as_ivec3().clamp(IVec3::ZERO, IVec3::splat(last)),
+            t: enter,
+            leave,
+            last,
+            step: ray.direction.to_array().map(|d| if d > 0.0 { 1 } else { -1 }),
+            width: inverse.map(f64::abs),
+        })
+    }
+
+    /// Where the ray leaves the cell through the walls of each axis.
+    #[inline]
+    fn walls(&self) -> [f64; 3] {
+        std::array::from_fn(|k| self.wall(k, self.place[k] + i32::from(self.step[k] > 0)))
+    }
+
+    #[inline]
+    fn wall(&self, k: usize, at: i32) -> f64 {
+        if self.ray.direction[k] == 0.0 {
+            return f64::INFINITY;
+        }
+        (f64::from(at) - self.ray.origin[k]) * self.inverse[k]
+    }
+
+    /// Goes on behind the brick; `false` where the lattice ends.
+    #[inline]
+    fn skip_brick(&mut self) -> bool {
+        let size = BRICK as i32;
+        let low = self.place / size * size;
+        let beyond = |k: usize| low[k] + if self.step[k] > 0 { size } else { 0 };
+        let (end, axis) = nearest(std::array::from_fn(|k| self.wall(k, beyond(k))));
+        self.t = self.t.max(end);
+        let next = if self.step[axis] > 0 { low[axis] + size } else { low[axis] - 1 };
+        let here = (self.ray.origin + self.ray.direction * self.t).floor().as_ivec3();
+        self.place = here.clamp(low, (low + (size - 1)).min(IVec3::splat(self.last)));
+        self.place[axis] = next;
+        (0..=self.last).contains(&next)
     }
 }
 

@@ -5,7 +5,7 @@ use crate::error::VolumeError;
 use crate::header::Coding;
 use crate::options::{Blank, CodebookOptions, CodebookSize, MAX_WORDS, Space};
 use forest_soup::{linear_to_srgb8, srgb8_to_linear};
-use forest_vq::{TrainOptions, Training, Vectors, lab_to_linear, linear_to_lab, train};
+use forest_vq::{TrainOptions, Training, Vectors, assign, lab_to_linear, linear_to_lab, train};
 use rayon::prelude::*;
 
 /// Billboards by the numbers of their codewords.
@@ -51,6 +51,12 @@ pub struct Quality {
 /// Fewest codewords that are tried for a PSNR.
 const FEWEST: usize = 16;
 
+/// Billboards that codebooks are trained on at most, evenly through all: more change little.
+const TRAINING: usize = 1 << 18;
+
+/// Billboards whose codewords are looked up together.
+const CHUNK: usize = 1 << 16;
+
 /// Finds codebooks for billboards of `side × side` texels, given one after the other.
 ///
 /// # Errors
@@ -61,102 +67,189 @@ pub fn quantise(
     options: &CodebookOptions,
 ) -> Result<Quantised, VolumeError> {
     options.validate().map_err(VolumeError::Options)?;
-    let t2 = (side * side) as usize;
-    let (color_vectors, alpha_vectors) =
-        (color_vectors(texels, t2, options)?, alpha_vectors(texels, t2)?);
-    let colors = |training: &Training| color_words(training, options);
-    let (color, color_words) = search(
-        &color_vectors,
-        options,
-        &|t| color_psnr(texels, t2, &colors(t), &t.indices),
-        &colors,
-    )?;
-    let (alpha, alpha_words) = search(
-        &alpha_vectors,
-        options,
-        &|t| alpha_psnr(texels, t2, &alpha_words(t), &t.indices),
-        &alpha_words,
-    )?;
+    let billboards = Billboards { texels, t2: (side * side) as usize, options };
+    let color = Book::of(&billboards, Part::Color)?;
+    let alpha = Book::of(&billboards, Part::Alpha)?;
     let coding = Coding::Codebook {
-        colors: color.codebook.len() as u32,
-        alphas: alpha.codebook.len() as u32,
+        colors: color.training.codebook.len() as u32,
+        alphas: alpha.training.codebook.len() as u32,
         block: options.block,
     };
-    let words = Codewords { texels: side, colors: color_words, alphas: alpha_words };
+    let words = Codewords {
+        texels: side,
+        colors: billboards.color_words(&color.training),
+        alphas: alpha_words(&alpha.training),
+    };
     let atlas = words.encode(coding);
     let words = Codewords::decode(&atlas, coding, side);
     let quality = Quality {
-        color_psnr: color_psnr(texels, t2, &words.colors, &color.indices),
-        alpha_psnr: alpha_psnr(texels, t2, &words.alphas, &alpha.indices),
-        delta_e: delta_e(texels, t2, &words.colors, &color.indices),
+        color_psnr: billboards.color_psnr(&words.colors, &color.indices),
+        alpha_psnr: billboards.alpha_psnr(&words.alphas, &alpha.indices),
+        delta_e: billboards.delta_e(&words.colors, &color.indices),
     };
-    let effort =
-        [&color, &alpha].map(|t| Effort { rounds: t.history.len(), distances: t.distances });
+    let effort = [&color.training, &alpha.training]
+        .map(|t| Effort { rounds: t.history.len(), distances: t.distances });
     let (colors, alphas) = (color.indices, alpha.indices);
     Ok(Quantised { coding, words, atlas, colors, alphas, quality, effort })
 }
 
-/// Trains a codebook of the size that is asked for, or the smallest that is good enough.
-fn search<W>(
-    vectors: &Vectors,
-    options: &CodebookOptions,
-    psnr: &dyn Fn(&Training) -> f64,
-    words: &dyn Fn(&Training) -> W,
-) -> Result<(Training, W), VolumeError> {
-    let trained = |codewords| {
-        let options = TrainOptions {
-            codewords,
-            seed: options.seed,
-            centers: options.centers,
-            ..TrainOptions::default()
+/// What a codebook is of.
+#[derive(Clone, Copy)]
+enum Part {
+    Color,
+    Alpha,
+}
+
+/// What is to be coded.
+struct Billboards<'a> {
+    texels: &'a [[u8; 4]],
+    /// Texels of each.
+    t2: usize,
+    options: &'a CodebookOptions,
+}
+
+/// A codebook, and the words of all billboards.
+struct Book {
+    training: Training,
+    indices: Vec<u32>,
+}
+
+impl Book {
+    /// A codebook of the size that is asked for, or the smallest that is good enough.
+    fn of(billboards: &Billboards, part: Part) -> Result<Self, VolumeError> {
+        let count = billboards.texels.len() / billboards.t2;
+        let step = count.div_ceil(TRAINING).max(1);
+        let sample = (0..count).step_by(step).map(|i| &billboards.texels[i * billboards.t2..]);
+        let sample: Vec<[u8; 4]> = sample.flat_map(|b| &b[..billboards.t2]).copied().collect();
+        let vectors = billboards.vectors(&sample, part)?;
+        let trained = |codewords| -> Result<Self, VolumeError> {
+            let options = TrainOptions {
+                codewords,
+                seed: billboards.options.seed,
+                centers: billboards.options.centers,
+                ..TrainOptions::default()
+            };
+            let mut training = train(&vectors, None, &options)?;
+            let indices = match step {
+                1 => std::mem::take(&mut training.indices),
+                _ => billboards.assign(&training, part)?,
+            };
+            Ok(Self { training, indices })
         };
-        train(vectors, None, &options)
-    };
-    let wanted = match options.size {
-        CodebookSize::Words(n) => {
-            let training = trained(n)?;
-            let words = words(&training);
-            return Ok((training, words));
+        let wanted = match billboards.options.size {
+            CodebookSize::Words(n) => return trained(n),
+            CodebookSize::Psnr(wanted) => wanted,
+        };
+        let mut size = FEWEST;
+        loop {
+            let book = trained(size)?;
+            let reached = match part {
+                Part::Color => {
+                    let words = billboards.color_words(&book.training);
+                    billboards.color_psnr(&words, &book.indices)
+                }
+                Part::Alpha => billboards.alpha_psnr(&alpha_words(&book.training), &book.indices),
+            };
+            if reached >= wanted {
+                return Ok(book);
+            }
+            // Fewer words than asked for are all that there are.
+            let words = book.training.codebook.len();
+            if size == MAX_WORDS || words < size {
+                return Err(VolumeError::Quality { wanted, words, reached });
+            }
+            size *= 2;
         }
-        CodebookSize::Psnr(wanted) => wanted,
-    };
-    let mut size = FEWEST;
-    loop {
-        let training = trained(size)?;
-        let reached = psnr(&training);
-        if reached >= wanted {
-            let words = words(&training);
-            return Ok((training, words));
-        }
-        // Fewer words than asked for are all that there are.
-        if size == MAX_WORDS || training.codebook.len() < size {
-            return Err(VolumeError::Quality { wanted, words: training.codebook.len(), reached });
-        }
-        size *= 2;
     }
 }
 
-/// A billboard's colours, three numbers a texel.
-fn color_vectors(
-    texels: &[[u8; 4]],
-    t2: usize,
-    options: &CodebookOptions,
-) -> Result<Vectors, VolumeError> {
-    let values: Vec<f32> = texels
-        .par_chunks(t2)
-        .flat_map_iter(|billboard| {
-            let blank = blank_color(billboard, options.blank);
-            billboard.iter().flat_map(move |&[r, g, b, a]| {
-                let color = if a > 0 { [r, g, b] } else { blank };
-                coordinates(color, options.space)
-            })
+impl Billboards<'_> {
+    /// The vectors of some billboards: three numbers a texel, or one.
+    fn vectors(&self, texels: &[[u8; 4]], part: Part) -> Result<Vectors, VolumeError> {
+        let (t2, options) = (self.t2, self.options);
+        Ok(match part {
+            Part::Alpha => Vectors::new(t2, texels.iter().map(|t| f32::from(t[3])).collect())?,
+            Part::Color => {
+                let values = texels.par_chunks(t2).flat_map_iter(|billboard| {
+                    let blank = blank_color(billboard, options.blank);
+                    billboard.iter().flat_map(move |&[r, g, b, a]| {
+                        let color = if a > 0 { [r, g, b] } else { blank };
+                        coordinates(color, options.space)
+                    })
+                });
+                Vectors::new(3 * t2, values.collect())?
+            }
         })
-        .collect();
-    Ok(Vectors::new(3 * t2, values)?)
-}
+    }
 
-fn alpha_vectors(texels: &[[u8; 4]], t2: usize) -> Result<Vectors, VolumeError> {
-    Ok(Vectors::new(t2, texels.iter().map(|t| f32::from(t[3])).collect())?)
+    /// The nearest word of every billboard.
+    fn assign(&self, training: &Training, part: Part) -> Result<Vec<u32>, VolumeError> {
+        let mut out = Vec::with_capacity(self.texels.len() / self.t2);
+        for chunk in self.texels.chunks(CHUNK * self.t2) {
+            out.extend(assign(&training.codebook, &self.vectors(chunk, part)?));
+        }
+        Ok(out)
+    }
+
+    /// Colour words in sRGB.
+    fn color_words(&self, training: &Training) -> Vec<[u8; 3]> {
+        let to_srgb = |v: &[f32; 3]| match self.options.space {
+            Space::Lab => lab_to_linear(*v).map(linear_to_srgb8),
+            Space::Rgb => v.map(|v| v.round().clamp(0.0, 255.0) as u8),
+        };
+        let mut words: Vec<[u8; 3]> =
+            training.codebook.words().as_chunks::<3>().0.iter().map(to_srgb).collect();
+        if self.options.blank == Blank::Black {
+            words.chunks_exact_mut(self.t2).for_each(fill_black);
+        }
+        words
+    }
+
+    /// Mean over texels that have a difference, in chunks whose sums do not depend on the threads:
+    /// `difference` is told the texel's place among all words.
+    fn mean(
+        &self,
+        indices: &[u32],
+        difference: &(dyn Fn(usize, [u8; 4]) -> Option<f64> + Sync),
+    ) -> f64 {
+        let sums: Vec<(f64, u64)> = self
+            .texels
+            .par_chunks(CHUNK * self.t2)
+            .zip(indices.par_chunks(CHUNK))
+            .map(|(texels, indices)| {
+                let mut sum = (0.0, 0);
+                for (billboard, &word) in texels.chunks_exact(self.t2).zip(indices) {
+                    for (i, &texel) in billboard.iter().enumerate() {
+                        if let Some(d) = difference(word as usize * self.t2 + i, texel) {
+                            sum = (sum.0 + d, sum.1 + 1);
+                        }
+                    }
+                }
+                sum
+            })
+            .collect();
+        let (sum, count) = sums.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        sum / count.max(1) as f64
+    }
+
+    fn color_psnr(&self, words: &[[u8; 3]], indices: &[u32]) -> f64 {
+        psnr(self.mean(indices, &|i, [r, g, b, a]| {
+            let square = |(p, q): (u8, u8)| f64::from(p.abs_diff(q)).powi(2);
+            (a > 0).then(|| [r, g, b].into_iter().zip(words[i]).map(square).sum::<f64>() / 3.0)
+        }))
+    }
+
+    fn alpha_psnr(&self, words: &[u8], indices: &[u32]) -> f64 {
+        psnr(self.mean(indices, &|i, texel| Some(f64::from(texel[3].abs_diff(words[i])).powi(2))))
+    }
+
+    fn delta_e(&self, words: &[[u8; 3]], indices: &[u32]) -> f64 {
+        let labs: Vec<[f32; 3]> = words.iter().map(|&w| lab(w)).collect();
+        self.mean(indices, &|i, [r, g, b, a]| {
+            let square = |(p, q): (f32, f32)| f64::from(p - q).powi(2);
+            (a > 0).then(|| lab([r, g, b]).into_iter().zip(labs[i]).map(square).sum::<f64>().sqrt())
+        })
+    }
 }
 
 /// What blank texels of a billboard hold.
@@ -186,21 +279,6 @@ fn coordinates(color: [u8; 3], space: Space) -> [f32; 3] {
     }
 }
 
-/// Colour words in sRGB.
-fn color_words(training: &Training, options: &CodebookOptions) -> Vec<[u8; 3]> {
-    let dimension = training.codebook.dimension();
-    let to_srgb = |v: &[f32; 3]| match options.space {
-        Space::Lab => lab_to_linear(*v).map(linear_to_srgb8),
-        Space::Rgb => v.map(|v| v.round().clamp(0.0, 255.0) as u8),
-    };
-    let mut words: Vec<[u8; 3]> =
-        training.codebook.words().as_chunks::<3>().0.iter().map(to_srgb).collect();
-    if options.blank == Blank::Black {
-        words.chunks_exact_mut(dimension / 3).for_each(fill_black);
-    }
-    words
-}
-
 /// "Every black pixel in the quantized texture [is replaced] with the color of the brightest pixel"
 /// (section 4.1.1): colour words are shared by billboards whose opaque texels lie elsewhere.
 fn fill_black(word: &mut [[u8; 3]]) {
@@ -213,57 +291,8 @@ fn alpha_words(training: &Training) -> Vec<u8> {
     training.codebook.words().iter().map(|v| v.round().clamp(0.0, 255.0) as u8).collect()
 }
 
-/// Sum and count over billboards, in chunks whose sums do not depend on the threads.
-fn mean(
-    texels: &[[u8; 4]],
-    t2: usize,
-    indices: &[u32],
-    difference: &(dyn Fn(usize, [u8; 4]) -> Option<f64> + Sync),
-) -> f64 {
-    const CHUNK: usize = 4096;
-    let sums: Vec<(f64, u64)> = texels
-        .par_chunks(CHUNK * t2)
-        .zip(indices.par_chunks(CHUNK))
-        .map(|(texels, indices)| {
-            let mut sum = (0.0, 0);
-            for (billboard, &word) in texels.chunks_exact(t2).zip(indices) {
-                for (i, &texel) in billboard.iter().enumerate() {
-                    if let Some(d) = difference(word as usize * t2 + i, texel) {
-                        sum = (sum.0 + d, sum.1 + 1);
-                    }
-                }
-            }
-            sum
-        })
-        .collect();
-    let (sum, count) = sums.iter().fold((0.0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    sum / count.max(1) as f64
-}
-
 fn psnr(mean_square: f64) -> f64 {
     10.0 * (255.0 * 255.0 / mean_square).log10()
-}
-
-fn color_psnr(texels: &[[u8; 4]], t2: usize, words: &[[u8; 3]], indices: &[u32]) -> f64 {
-    psnr(mean(texels, t2, indices, &|i, [r, g, b, a]| {
-        let square = |(p, q): (u8, u8)| f64::from(p.abs_diff(q)).powi(2);
-        (a > 0).then(|| [r, g, b].into_iter().zip(words[i]).map(square).sum::<f64>() / 3.0)
-    }))
-}
-
-fn alpha_psnr(texels: &[[u8; 4]], t2: usize, words: &[u8], indices: &[u32]) -> f64 {
-    psnr(mean(texels, t2, indices, &|i, texel| {
-        Some(f64::from(texel[3].abs_diff(words[i])).powi(2))
-    }))
-}
-
-fn delta_e(texels: &[[u8; 4]], t2: usize, words: &[[u8; 3]], indices: &[u32]) -> f64 {
-    let labs: Vec<[f32; 3]> = words.iter().map(|&w| lab(w)).collect();
-    mean(texels, t2, indices, &|i, [r, g, b, a]| {
-        let square = |(p, q): (f32, f32)| f64::from(p - q).powi(2);
-        let (p, q) = (lab([r, g, b]), labs[i]);
-        (a > 0).then(|| p.into_iter().zip(q).map(square).sum::<f64>().sqrt())
-    })
 }
 
 #[cfg(test)]
