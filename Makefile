@@ -6,6 +6,8 @@
 #   make bench    measure bakes; writes docs/BENCH.md and docs/LEVELS.txt
 #   make report   evaluate the trees; writes docs/REPORT.md, the README's figures, out/report/*.html
 #   make views    measure views; writes docs/VIEWS.md and docs/views.svg
+#   make volume   measure volumes; writes docs/VOLUME.md, docs/volume.svg, docs/volume_heldout.png
+#   make codebooks  codebook training beside faiss and scikit-learn, if $PYTHON has them; writes docs/CODEBOOKS.md
 #   make three    draw exported views in three.js, in a headless browser; writes docs/three.png
 #   make picture  draw the README's picture anew
 #   make golden   write the golden packs anew, after a meant change of the format
@@ -17,7 +19,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: demo test check bench report views three picture golden samples fuzz deny setup
+.PHONY: demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
 
 # What the build needs from the system: a linker with C and C++ compilers, for zstd and meshoptimizer.
 setup:
@@ -50,11 +52,16 @@ demo: setup
 	@target/release/forest-bake draw $(OUT)/conifer.fpack -o $(OUT)/conifer-lookup.png --as views \
 	  --lookup nearest,blend,depth --view 25,12 -q
 	@target/release/forest-bake export $(OUT)/conifer.fpack -o $(OUT)/conifer-three --for three --force -q
+	@target/release/forest-bake volume sample-data/conifer.glb -o $(OUT)/conifer.fpack
+	@target/release/forest-bake verify $(OUT)/conifer.fpack
+	@target/release/forest-bake draw $(OUT)/conifer.fpack -o $(OUT)/conifer-volume.png --as volume \
+	  --level 7,6,5,4 --view 25,12 -q
 	@target/release/forest-bake levels sample-data/conifer.glb > $(OUT)/conifer-levels.txt
 	@target/release/forest-bake inspect $(OUT)/block.fpack
 	@echo; echo "Packs:    $(OUT)/*.fpack"; \
 	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together;"; \
-	echo "          conifer-views.png: from 289 directions; conifer-lookup.png: nearest, blended, through depth)"; \
+	echo "          conifer-views.png: from 289 directions; conifer-lookup.png: nearest, blended, through depth;"; \
+	echo "          conifer-volume.png: four levels of billboards)"; \
 	echo "Export:   $(OUT)/conifer-three (for three.js)"; \
 	echo "Report:   $(OUT)/conifer-levels.txt (what each radius rule and order keeps, by level)"
 
@@ -82,6 +89,15 @@ report: setup
 views: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/views
+
+volume: setup
+	$(CARGO) build --release --workspace --bins
+	target/release/volumes
+
+codebooks: setup
+	$(CARGO) build --release --workspace --bins
+	target/release/codebooks > docs/CODEBOOKS.md.new && mv docs/CODEBOOKS.md.new docs/CODEBOOKS.md
+	@cat docs/CODEBOOKS.md
 
 # Node.js, npm and Chromium, and three.js by npm: not needed by anything else.
 three: setup

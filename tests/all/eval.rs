@@ -313,7 +313,7 @@ fn reports_are_whole_and_need_no_network() {
     );
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!(lines.len(), 1 + e.rows.len());
-    assert!(lines.iter().all(|l| l.split(',').count() == 22), "{}", lines[1]);
+    assert!(lines.iter().all(|l| l.split(',').count() == 23), "{}", lines[1]);
     let (first, rest) = html.split_once("base64,").unwrap();
     let texts: Vec<&str> = rest.split("base64,").map(|t| t.split_once('"').unwrap().1).collect();
     let words = first.to_string() + &texts.concat();

@@ -13,3 +13,4 @@ mod real_trees; // trees by others, where they are present
 mod support;
 mod views;
 mod views_export; // temporary folders, running the program
+mod volume; // volumes: from meshes and photographs, order, hard cases

@@ -1,12 +1,13 @@
 //! The golden packs: what they are made of. `make golden` writes them; tests only read them.
 
 use crate::soups::{leaves, texture, textured};
-use crate::{bake_bytes, bake_views, open};
+use crate::{bake_bytes, bake_views, bake_volume, open};
 use forest_pack::measures::{Light, Measure, Measures};
 use forest_pack::{PackError, PackWriter, kind};
 use forest_points::{BakeOptions, Calibration, GridChoice, Order, RadiusRule, SurfelSize};
 use forest_soup::{AlphaMode, TriangleSoup};
 use forest_views::{Directions, Dome, Quality, ViewsOptions};
+use forest_volume::{CodebookOptions, CodebookSize, Stand, VolumeOptions};
 use std::path::PathBuf;
 
 /// One golden pack.
@@ -23,6 +24,8 @@ enum Content {
     Points { options: BakeOptions, measured: bool },
     /// Views, and nothing else.
     Views(ViewsOptions),
+    /// A volume, and nothing else.
+    Volume(VolumeOptions, CodebookOptions),
 }
 
 /// No golden pack is larger.
@@ -46,6 +49,11 @@ impl Golden {
             }
             Content::Views(options) => {
                 bake_views(&self.soup, options).expect("a golden soup bakes")
+            }
+            Content::Volume(options, codebook) => {
+                let stand = Stand::Dome { cameras: 5 };
+                let baked = bake_volume(&self.soup, stand, options, Some(codebook));
+                baked.expect("a golden soup bakes").0
             }
         }
     }
@@ -127,8 +135,16 @@ pub fn all() -> Vec<Golden> {
         points("one-triangle.fpack", leaves(1, 0.5, 4), single),
         Golden {
             name: "views.fpack",
-            soup: textured(leaves(60, 0.3, 5), leaf, mask),
+            soup: textured(leaves(60, 0.3, 5), leaf.clone(), mask),
             content: Content::Views(views),
+        },
+        Golden {
+            name: "volume.fpack",
+            soup: textured(leaves(60, 0.3, 6), leaf, mask),
+            content: Content::Volume(
+                VolumeOptions { levels: 3, ..VolumeOptions::default() },
+                CodebookOptions { size: CodebookSize::Words(40), ..CodebookOptions::default() },
+            ),
         },
         Golden {
             name: "measured.fpack",

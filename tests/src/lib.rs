@@ -2,9 +2,10 @@
 
 pub mod golden;
 pub mod reference;
+pub mod reports;
 pub mod soups;
 
-use forest_draw::{ViewsLevel, draw_points, read_surfaces};
+use forest_draw::{Blending, ViewsLevel, VolumeScene, draw_points, read_surfaces};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{ErrorKind, Light, Measures, Need};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
@@ -14,8 +15,16 @@ use forest_points::{
 use forest_raster::{CaptureScene, Sampling, Style, Surfaces};
 use forest_soup::{Camera, Projection, TriangleSoup};
 use forest_views::{Frame, Lookup, ViewsBlock, ViewsError, ViewsOptions};
+use forest_volume::{
+    CodebookOptions, Detail, Stand, Volume, VolumeBlock, VolumeError, VolumeOptions,
+};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
+
+/// A fixed `meta` section.
+fn no_meta() -> Meta {
+    Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] }
+}
 
 /// Bakes into memory; the pack has a fixed `meta` section.
 ///
@@ -28,8 +37,7 @@ pub fn bake_bytes(
     let dir = tempfile::tempdir().expect("a temporary folder");
     let path = dir.path().join("t.fpack");
     let mut writer = PackWriter::create(&path)?;
-    let meta = Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] };
-    header::write(&mut writer, SectionId::new(kind::META, 0), &meta)?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
     let report = bake(soup, options, &mut writer, &|_| {})?;
     writer.finish()?;
     Ok((std::fs::read(&path).expect("the pack that was just written"), report))
@@ -43,8 +51,7 @@ pub fn bake_views(soup: &TriangleSoup, options: &ViewsOptions) -> Result<Vec<u8>
     let dir = tempfile::tempdir().expect("a temporary folder");
     let path = dir.path().join("t.fpack");
     let mut writer = PackWriter::create(&path)?;
-    let meta = Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] };
-    header::write(&mut writer, SectionId::new(kind::META, 0), &meta)?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
     let frame =
         Frame::of(soup, &options.directions, options.fit).ok_or(ViewsError::NothingToSee)?;
     let surfaces = Surfaces::new(&soup.materials, &soup.textures);
@@ -55,6 +62,38 @@ pub fn bake_views(soup: &TriangleSoup, options: &ViewsOptions) -> Result<Vec<u8>
     forest_views::bake(&scene, &frame, options, &mut writer, &|_| {})?;
     writer.finish()?;
     Ok(std::fs::read(&path).expect("the pack that was just written"))
+}
+
+/// The bytes of a pack of nothing but the volume of a soup, and what its bake said.
+///
+/// # Errors
+/// As the bake.
+pub fn bake_volume(
+    soup: &TriangleSoup,
+    stand: Stand,
+    options: &VolumeOptions,
+    codebook: Option<&CodebookOptions>,
+) -> Result<(Vec<u8>, Volume), VolumeError> {
+    let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+    let volume = Volume::from_mesh(soup, &surfaces, stand, options, &|_| {})?;
+    Ok((write_volume(&volume, codebook)?.0, volume))
+}
+
+/// The bytes of a pack of nothing but a volume, and the bake's report.
+///
+/// # Errors
+/// As the bake.
+pub fn write_volume(
+    volume: &Volume,
+    codebook: Option<&CodebookOptions>,
+) -> Result<(Vec<u8>, forest_volume::BakeReport), VolumeError> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
+    let report = forest_volume::bake(volume, codebook, &mut writer)?;
+    writer.finish()?;
+    Ok((std::fs::read(&path).expect("the pack"), report))
 }
 
 /// The trees that a report is about: these of sample-data, and these of ../shared/trees where they
@@ -101,14 +140,14 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         };
         table.cheapest(&need, 0.1).or(table.best_within(&need, 1e3));
     }
-    let drawn = if ViewsBlock::is_in(&pack) { use_views(&pack)? } else { 0 };
+    let mut drawn = if ViewsBlock::is_in(&pack) { use_views(&pack)? } else { 0 };
+    drawn += if VolumeBlock::is_in(&pack) { use_volume(&pack)? } else { 0 };
     if drawn > 0 && !PointsBlock::is_in(&pack) {
         return Ok(drawn);
     }
     let block = PointsBlock::open(&pack)?;
     let surfaces = read_surfaces(&pack, &block)?;
     let projection = Projection::Perspective { fov_y: 1.0 };
-    let mut drawn = drawn;
     for distance in [0.0, 1.0, 1e4] {
         let eye = block.origin() + DVec3::Z * (distance * block.scale());
         let camera = Camera::new(eye, -DVec3::Z, projection, [640, 480]);
@@ -138,6 +177,29 @@ fn use_views(pack: &Pack) -> Result<usize, PackError> {
             let camera = Camera::new(eye, -from, projection, [8, 8]);
             for lookup in Lookup::ALL {
                 drawn += views.draw(&camera, lookup, &style).1.views as usize;
+            }
+        }
+    }
+    Ok(drawn)
+}
+
+/// Decodes the volume and draws it, from afar and from within, whole and by planes.
+fn use_volume(pack: &Pack) -> Result<usize, PackError> {
+    let block = VolumeBlock::open(pack)?;
+    let scene = VolumeScene::read(&block)?;
+    let (middle, side) = (block.lattice().middle(), block.header.side);
+    let mut drawn = 0;
+    for (projection, distance) in [
+        (Projection::Perspective { fov_y: 1.0 }, 0.1),
+        (Projection::Perspective { fov_y: 1.0 }, 3.0),
+        (Projection::Orthographic { height: side }, 4.0),
+    ] {
+        let from = DVec3::new(0.3, 0.2, 1.0).normalize();
+        let camera = Camera::new(middle + from * (distance * side), -from, projection, [8, 8]);
+        for detail in [Detail::Level(2), Detail::PIXEL] {
+            for blending in [Blending::Shares, Blending::Over] {
+                let (_, cost) = scene.draw(&camera, detail, blending, Sampling::MIDDLE);
+                drawn += cost.billboards as usize;
             }
         }
     }

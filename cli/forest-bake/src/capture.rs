@@ -54,8 +54,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     soup.validate()?;
     let bounds = soup.bounds();
     let radius = bounds.half_diagonal();
-    // Not `<=`: what is not a number is refused too.
-    if bounds.is_empty() || !(radius > 0.0) {
+    if bounds.is_empty() || radius <= 0.0 {
         let what = "no triangle with finite corners and an extent";
         return Err(VolumeError::NothingToSee(what.into()).into());
     }

@@ -182,7 +182,7 @@ pub fn volume_contenders<'a>(scene: Option<&'a VolumeScene<'a>>) -> Vec<Contende
     let named = |scene| Contender {
         name: "volume",
         what: "the volume, one level of it, two cameras blended",
-        way: Way::Volume { scene },
+        way: Way::Volume { scene, only: None },
     };
     scene.map(named).into_iter().collect()
 }

@@ -36,7 +36,7 @@ pub(crate) enum Way<'a> {
     /// Views, level by level, looked up in one way.
     Views { levels: &'a [ViewsLevel<'a>], lookup: Lookup },
     /// A volume, level by level.
-    Volume { scene: &'a VolumeScene<'a> },
+    Volume { scene: &'a VolumeScene<'a>, only: Option<u32> },
     /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
     Meshes { levels: &'a [(f64, Cow<'a, TriangleSoup>)], surfaces: &'a Surfaces },
 }
@@ -146,6 +146,13 @@ pub struct Cost {
 const MESH_TRIANGLE_BYTES: f64 = 12.0 + 16.0;
 
 impl Contender<'_> {
+    /// Of a volume, looks at one level only.
+    pub fn only_level(&mut self, level: u32) {
+        if let Way::Volume { only, .. } = &mut self.way {
+            *only = Some(level);
+        }
+    }
+
     /// The knob's settings for the sweep's values of s_m and shares, finest first.
     pub(crate) fn knobs(&self, s_m: &[f64], shares: &[f64]) -> Vec<Knob> {
         match &self.way {
@@ -162,9 +169,10 @@ impl Contender<'_> {
                 .iter()
                 .map(|l| Knob::Views { texels: l.side(), lookup: (*lookup).into() })
                 .collect(),
-            Way::Volume { scene } => {
-                let levels = scene.block().header.levels.len() as u32;
-                (0..levels).rev().map(|level| Knob::Volume { level }).collect()
+            Way::Volume { scene, only } => {
+                let levels = 0..scene.block().header.levels.len() as u32;
+                let levels = only.map_or(levels, |level| level..level + 1);
+                levels.rev().map(|level| Knob::Volume { level }).collect()
             }
             Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),
             Way::Meshes { levels, .. } => levels.iter().map(|l| Knob::Share(l.0)).collect(),
@@ -202,7 +210,7 @@ impl Contender<'_> {
                 let (primitives, bytes) = (drawn.views as f64, drawn.bytes as f64);
                 (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
             }
-            (Way::Volume { scene }, Knob::Volume { level }) => {
+            (Way::Volume { scene, .. }, Knob::Volume { level }) => {
                 let detail = Detail::Level(level);
                 let (picture, drawn) = scene.draw(camera, detail, Blending::Shares, style.sampling);
                 let (primitives, bytes) = (drawn.billboards as f64, drawn.bytes);

@@ -36,8 +36,8 @@ pub(crate) fn average(
     let mut next = 0;
     for (i, &(first, mask)) in (0..).zip(&cells.children) {
         let mut children = Vec::new();
-        let mut cell = first;
-        for number in (0..lattice.branching.children()).filter(|n| mask >> n & 1 == 1) {
+        let there = (0..lattice.branching.children()).filter(|n| mask >> n & 1 == 1);
+        for (cell, number) in (first..).zip(there) {
             // Both lists ascend.
             while next < below.cells.len() && below.cells[next] < cell {
                 next += 1;
@@ -51,7 +51,6 @@ pub(crate) fn average(
                     texels: &below.texels[next * t2..][..t2],
                 });
             }
-            cell += 1;
         }
         if children.is_empty() {
             continue;

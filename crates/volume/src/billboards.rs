@@ -218,9 +218,9 @@ impl Rays<'_> {
             out.hidden.push(f64::from(light) < (1.0 - self.options.prune) * rays * all);
             if found.iter().any(|f| f.stopped > 0.0) {
                 out.cells.push(i as u32);
-                let mean = Found::sum(found).color();
+                let whole = Found::sum(found);
                 let texel =
-                    |(f, &share): (&Found, &f64)| f.texel(cells.opacity[i], share as f32, mean);
+                    |(f, &share): (&Found, &f64)| f.texel(cells.opacity[i], share as f32, &whole);
                 out.texels.extend(found.iter().zip(&self.shares).map(texel));
             }
         }
@@ -324,6 +324,7 @@ impl Found {
     fn sum(all: &[Self]) -> Self {
         let mut sum = Self::default();
         for f in all {
+            sum.reach += f.reach;
             sum.stopped += f.stopped;
             (0..3).for_each(|k| sum.rgb[k] += f.rgb[k]);
         }
@@ -336,14 +337,18 @@ impl Found {
         self.rgb.map(|v| v * scale)
     }
 
-    /// A texel whose share `inside` lies in the cell's picture. Neighbours' billboards overlap
-    /// outside; light that passes both of them is stopped by the whole when each stops, as
-    /// transmittances multiply, the power of its share.
-    fn texel(&self, opacity: f32, inside: f32, mean: [f32; 3]) -> [u8; 4] {
+    /// A texel of a billboard that found `whole`; its share `inside` lies in the cell's picture.
+    /// Outside, neighbours' billboards overlap with this one. A thing that ends at the wall covers
+    /// its share of the texel. Of a thing that goes on in the neighbour each stops, as
+    /// transmittances multiply, the power of its share, so that both together stop it. The fuller
+    /// the cell, the more likely things go on.
+    fn texel(&self, opacity: f32, inside: f32, whole: &Self) -> [u8; 4] {
         let unknown = (LEAST_REACH - self.reach).max(0.0);
         let alpha = ((self.stopped + unknown * opacity) / (self.reach + unknown)).min(1.0);
-        let shared = 1.0 - (1.0 - alpha).powf(inside);
-        let rgb = if self.stopped > 0.0 { self.color() } else { mean };
+        let full = whole.stopped / whole.reach.max(whole.stopped);
+        let (ends, goes_on) = (alpha * inside, 1.0 - (1.0 - alpha).powf(inside));
+        let shared = ends + (goes_on - ends) * full;
+        let rgb = if self.stopped > 0.0 { self.color() } else { whole.color() };
         let [r, g, b] = rgb.map(linear_to_srgb8);
         [r, g, b, (shared * 255.0).round() as u8]
     }

@@ -89,7 +89,7 @@ impl<'a> Traversal<'a> {
     fn start(n: u32, ray: &'a LocalRay, from: f64) -> Option<Self> {
         let (end, inverse) = (f64::from(n), ray.direction.recip().to_array());
         let (mut enter, mut leave) = (from, f64::INFINITY);
-        for k in 0..3 {
+        for (k, inverse) in inverse.into_iter().enumerate() {
             // Along a face 0·∞ would say nothing.
             if ray.direction[k] == 0.0 {
                 if !(0.0..end).contains(&ray.origin[k]) {
@@ -97,7 +97,7 @@ impl<'a> Traversal<'a> {
                 }
                 continue;
             }
-            let (a, b) = (-ray.origin[k] * inverse[k], (end - ray.origin[k]) * inverse[k]);
+            let (a, b) = (-ray.origin[k] * inverse, (end - ray.origin[k]) * inverse);
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
@@ -167,7 +167,7 @@ mod tests {
             let levels = if tri { 2 } else { 4 };
             let lattice = Lattice { corner: DVec3::ZERO, side: 1.0, branching, levels };
             let n = lattice.cells(levels);
-            let hash = |i: u32| (i ^ seed).wrapping_mul(0x9e37_79b9).rotate_left(13) % 9 == 0;
+            let hash = |i: u32| (i ^ seed).wrapping_mul(0x9e37_79b9).rotate_left(13).is_multiple_of(9);
             let finest: Vec<f32> = (0..n * n * n).map(|i| f32::from(u8::from(hash(i)))).collect();
             let level = cells(&lattice, &Opacity::from_finest(&lattice, finest)).pop().unwrap();
             let (from, mut to) = (DVec3::from_array(from), DVec3::from_array(to));

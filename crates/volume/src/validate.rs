@@ -5,6 +5,9 @@ use crate::options::MAX_WORDS;
 use crate::photograph::MAX_CAMERAS;
 use forest_pack::kind;
 
+/// Texels of all billboards: 4 GiB of them.
+const MAX_ALL_TEXELS: u64 = 1 << 30;
+
 /// Checks the header alone: before anything is read that its numbers describe.
 ///
 /// # Errors
@@ -48,6 +51,13 @@ pub(crate) fn validate_header(h: &VolumeHeader) -> Result<(), String> {
         if u64::from(level.billboards) > most {
             return Err(format!("level {l} has {} billboards; at most {most}", level.billboards));
         }
+    }
+    let billboards: u64 = h.levels.iter().map(|l| u64::from(l.billboards)).sum();
+    let texels = billboards * h.billboard_texels() as u64;
+    if texels > MAX_ALL_TEXELS {
+        return Err(format!(
+            "{billboards} billboards of {texels} texels; at most {MAX_ALL_TEXELS}"
+        ));
     }
     if let Coding::Codebook { colors, alphas, .. } = h.coding {
         for (name, n) in [("colour", colors), ("alpha", alphas)] {
@@ -105,7 +115,7 @@ fn validate_level(
     for (i, (node, mask)) in stored.nodes.iter().zip(stored.masks.chunks_exact(words)).enumerate() {
         let fail = |problem: String| Err((kind::VOLUME_NODES, format!("node {i} {problem}")));
         let used: u32 = mask.iter().map(|m| m.count_ones()).sum();
-        let beyond = cameras % 32 != 0 && mask[words - 1] >> (cameras % 32) != 0;
+        let beyond = !cameras.is_multiple_of(32) && mask[words - 1] >> (cameras % 32) != 0;
         if beyond {
             let problem = format!("node {i} has billboards of cameras beyond the {cameras}");
             return Err((kind::VOLUME_CAMERAS, problem));

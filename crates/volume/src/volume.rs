@@ -94,12 +94,14 @@ impl Volume {
         options.validate().map_err(VolumeError::Options)?;
         check_cameras(stand.directions().len())?;
         soup.validate()?;
+        // About the soup's own origin: wherever it stands, the same is baked.
+        let (origin, soup) = (soup.origin, &TriangleSoup { origin: DVec3::ZERO, ..soup.clone() });
         let bounds = soup.bounds();
         if bounds.is_empty() || bounds.size().max_element() <= 0.0 {
             let what = "no triangle with finite corners and an extent";
             return Err(VolumeError::NothingToSee(what.into()));
         }
-        let bounds = [bounds.min, bounds.max].map(|p| soup.origin + p);
+        let bounds = [bounds.min, bounds.max];
         let lattice = cube(bounds, options.branching, options.levels);
         let start = Instant::now();
         let scene = CaptureScene::new(soup, surfaces);
@@ -111,7 +113,10 @@ impl Volume {
         mark(&lattice, &shots, &mut opacity);
         let report =
             VolumeReport { photographs: taken, opacity: start.elapsed(), ..Default::default() };
-        Ok(Self::assemble(lattice, bounds, &shots, &opacity, options, report, progress))
+        let mut made = Self::assemble(lattice, bounds, &shots, &opacity, options, report, progress);
+        made.lattice.corner += origin;
+        made.bounds = made.bounds.map(|b| b + origin);
+        Ok(made)
     }
 
     /// Makes a volume of photographs with mattes. Levels whose cells would be finer than their

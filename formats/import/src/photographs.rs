@@ -158,10 +158,9 @@ fn pose(source: &Source, element: &str, matrix: &[Vec<f64>]) -> Result<[DVec3; 4
     let [right, up, back] = axes.map(|a| a / scale);
     let off =
         [right.dot(up), up.dot(back), back.dot(right), up.length() - 1.0, back.length() - 1.0];
-    let worst =
-        off.iter().fold(0.0, |m: f64, v| if v.is_nan() { f64::NAN } else { m.max(v.abs()) });
-    // Not `>`: what is not a number is refused too.
-    if !(worst <= POSE_TOLERANCE) {
+    // `max` drops what is not a number: the axes of a matrix of zeros.
+    let worst = off.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    if worst > POSE_TOLERANCE || off.iter().any(|v| v.is_nan()) {
         return invalid(format!("is no rotation: off by {worst:.2e}; at most {POSE_TOLERANCE:e}"));
     }
     if right.cross(up).dot(back) < 0.0 {

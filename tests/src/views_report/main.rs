@@ -3,15 +3,13 @@
 
 mod study;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use forest_eval::{Evaluation, Summary};
-use forest_import::{Block, Limits};
-use forest_soup::TriangleSoup;
 use forest_tests::report_trees;
+use forest_tests::reports::{load_soup, name_of, program};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
 
 const TREES: [&str; 2] = ["conifer.glb", "broadleaf_young.gltf"];
 const SHARED: [&str; 2] = ["sap_birch_200k.glb", "ez_oak_dense_200k.glb"];
@@ -30,7 +28,7 @@ fn main() -> Result<()> {
         let name = name_of(tree);
         eprintln!("{name}");
         bakes.push((name.clone(), baked(tree, &out)?));
-        studies.push((name, study::of(&soup(tree)?)?));
+        studies.push((name, study::of(&load_soup(tree)?)?));
     }
     bake_table(&mut text, &bakes)?;
     study::write(&mut text, &studies)?;
@@ -48,26 +46,6 @@ Written by `make views`. Errors are means over four held-out views (sin of the e
 premultiplied linear RGBA over the box of both pictures. Times are those of one run on the machine
 named in BENCH.md; they are stated for their ratios.
 ";
-
-fn name_of(tree: &Path) -> String {
-    tree.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-fn soup(tree: &Path) -> Result<TriangleSoup> {
-    let block = Block::parse(&[tree.to_string_lossy().into_owned()])?;
-    Ok(block.load(&Limits::default())?.model.flatten(50_000_000)?)
-}
-
-/// Standard output of forest-bake.
-fn program(args: &[&str]) -> Result<Vec<u8>> {
-    let forest_bake = std::env::current_exe()?.with_file_name("forest-bake");
-    let output = Command::new(forest_bake).args(args).output()?;
-    if !output.status.success() {
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        bail!("forest-bake {args:?}: {}: {error}", output.status);
-    }
-    Ok(output.stdout)
-}
 
 /// What `views --json` says of a default bake of 300 views, and of the same with tiles of 32 texels
 /// from triangles and from points.
