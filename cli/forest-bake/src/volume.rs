@@ -5,7 +5,7 @@ use crate::output;
 use crate::source::{ImportArgs, LoadedSource, meta};
 use crate::target;
 use anyhow::Result;
-use forest_eval::{MatteErrors, hold_out, matte_errors};
+use forest_eval::{MatteErrors, can_judge, hold_out, matte_errors};
 use forest_import::{Up, load_photographs};
 use forest_pack::header::{self, Source};
 use forest_pack::{Pack, PackWriter, SectionId, kind};
@@ -84,7 +84,8 @@ struct CaptureArgs {
     /// Rounds of the opacity estimate on each level.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
-    /// Leave out this many photographs, evenly, and judge the pack by them.
+    /// Leave out this many photographs, evenly, and judge the pack by them: without a lens'
+    /// distortion, and with their axis in the middle.
     #[arg(long, default_value_t = 0, value_name = "N")]
     hold_out: u32,
 }
@@ -95,7 +96,7 @@ struct CodebookArgs {
     #[arg(long, default_value = "512", value_name = "N")]
     codebook: String,
     /// The smallest codebooks (16, 32, …) with at least this PSNR in dB, of colour and of alpha.
-    #[arg(long, value_name = "DB", conflicts_with = "codebook")]
+    #[arg(long, value_name = "DB", conflicts_with = "codebook", allow_hyphen_values = true)]
     psnr: Option<f64>,
     /// Colour space in which codewords are near or far.
     #[arg(long, value_enum, default_value = "lab")]
@@ -264,6 +265,9 @@ fn judge(pack: &Path, held_out: &[Photograph]) -> Result<Option<MatteErrors>> {
 const SUSPECT: f64 = 2.5;
 const SUSPECT_LEAST: f64 = 0.1;
 
+/// Median residual from which all of them are suspected.
+const SUSPECT_ALL: f64 = 0.25;
+
 /// Says what is odd about a capture.
 fn warn(photographs: &[Photograph], volume: &Volume, options: &VolumeOptions) {
     if volume.lattice.levels < options.levels {
@@ -273,7 +277,14 @@ fn warn(photographs: &[Photograph], volume: &Volume, options: &VolumeOptions) {
     let Some(found) = &volume.report.tomography else { return };
     let mut sorted = found.residuals.clone();
     sorted.sort_by(f64::total_cmp);
-    let limit = (SUSPECT * sorted[sorted.len() / 2]).max(SUSPECT_LEAST);
+    let median = sorted[sorted.len() / 2];
+    if median > SUSPECT_ALL {
+        eprintln!(
+            "warning: the mattes do not fit each other (median RMS {median:.3}; above {SUSPECT_ALL}): are \
+             poses and focal lengths right?"
+        );
+    }
+    let limit = (SUSPECT * median).max(SUSPECT_LEAST);
     for (photo, residual) in photographs.iter().zip(&found.residuals) {
         if *residual > limit {
             eprintln!(
@@ -314,6 +325,8 @@ impl Args {
             return Err(Usage(format!("--hold-out {n}: there are {count} photographs")).into());
         }
         let (photographs, held_out) = hold_out(set.photographs, self.capture.hold_out as usize);
+        // Before the work, not after.
+        held_out.iter().try_for_each(can_judge)?;
         let name = Path::new(capture).file_name().unwrap_or_default().to_string_lossy();
         let placement = match held_out.len() {
             0 => String::new(),

@@ -2,7 +2,7 @@
 
 use forest_pack::PackError;
 use forest_raster::{Layer, Picture, Sampling, composite};
-use forest_soup::{Camera, Projection, srgb8_to_linear};
+use forest_soup::{Camera, srgb8_to_linear};
 use forest_volume::{CameraShare, Detail, Item, Selection, VolumeBlock, select};
 use glam::{DVec2, IVec2};
 
@@ -80,16 +80,7 @@ impl<'a> VolumeScene<'a> {
     ) -> Option<Billboard<'_>> {
         let lattice = self.block.lattice();
         let node = &self.block.nodes[item.level as usize][item.node as usize];
-        let side = lattice.cell_side(item.level);
         let (x, y, depth) = camera.project(lattice.center(item.level, node.place()));
-        let mut weight = item.weight;
-        if matches!(camera.projection, Projection::Perspective { .. }) {
-            // Billboards around the eye fade away as it passes through them.
-            weight *= ((depth / side - 0.5) * 2.0).clamp(0.0, 1.0) as f32;
-        }
-        if weight <= 0.0 {
-            return None;
-        }
         let scale = camera.pixels_per_unit(depth);
         let mut faces = [None; 2];
         for (face, chosen) in faces.iter_mut().zip(&selection.cameras) {
@@ -102,7 +93,7 @@ impl<'a> VolumeScene<'a> {
             reach,
             faces,
             texels: self.block.header.texels,
-            weight,
+            weight: item.weight,
             blending,
         })
     }

@@ -42,7 +42,9 @@ pub enum EvalError {
         rule: &'static str,
     },
     /// A photograph's camera cannot be drawn from.
-    #[error("{0}: its lens, pixels or centre are not those of a plain camera: it cannot judge")]
+    #[error(
+        "{0} cannot judge: its matte is empty, or its lens, pixels or centre are not a plain camera's"
+    )]
     Lens(String),
     /// The report could not be made.
     #[error("cannot make the report: {0}")]

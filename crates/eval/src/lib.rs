@@ -67,7 +67,7 @@ pub use embed::measures;
 pub use error::EvalError;
 pub use evaluation::{ContenderInfo, Evaluation, SCHEMA, Subject, Summary, json_schema, machine};
 pub use frame::{Band, Frame, View, held_out_views};
-pub use mattes::{MatteErrors, drawn, hold_out, matte_errors};
+pub use mattes::{MatteErrors, can_judge, drawn, hold_out, matte_errors};
 pub use metrics::{Comparison, Errors, FlipMap, popping};
 pub use path::PoppingRow;
 pub use plan::{BACKGROUND, Plan};

@@ -33,6 +33,17 @@ pub fn hold_out(photos: Vec<Photograph>, n: usize) -> (Vec<Photograph>, Vec<Phot
     (strip(kept), strip(out))
 }
 
+/// Whether a volume can be drawn as a photograph shows it, and the photograph shows something.
+///
+/// # Errors
+/// When its lens, pixels or centre are not a plain camera's, or its matte is empty.
+pub fn can_judge(photo: &Photograph) -> Result<(), EvalError> {
+    if photo.camera.plain().is_none() || photo.pixels.iter().all(|p| p[3] == 0) {
+        return Err(EvalError::Lens(photo.name.clone()));
+    }
+    Ok(())
+}
+
 /// Draws the volume, finer than pixels, from each photograph's camera.
 ///
 /// # Errors

@@ -37,6 +37,9 @@ struct Sample {
 /// "Compositing digital images", 1984), at the samples that the canvas takes too. Normals point at
 /// the eye.
 pub fn composite<L: Layer>(layers: &[L], camera: &Camera, sampling: Sampling) -> Picture {
+    if camera.width == 0 || camera.height == 0 {
+        return Picture::empty(camera.width, camera.height);
+    }
     let pattern = Pattern::new(sampling);
     let row = (camera.width as usize * pattern.count()).max(1);
     let share = camera.height.div_ceil(2 * rayon::current_num_threads() as u32).max(1);

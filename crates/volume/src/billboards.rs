@@ -14,7 +14,7 @@ use crate::march::{LocalRay, walk};
 use crate::options::{Coarse, VolumeOptions};
 use crate::photograph::{Seen, Shot};
 use forest_raster::{DeepHit, DeepPicture};
-use forest_soup::{PhotoCamera, linear_to_srgb8, srgb8_to_linear};
+use forest_soup::{PhotoCamera, Photograph, linear_to_srgb8, srgb8_to_linear};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 
@@ -158,7 +158,8 @@ impl Rays<'_> {
                         met.push((cell, optical_depth(cells, cell) * (leave - enter) as f32));
                         true
                     });
-                    share(&met, photo.pixels[pixel], &mut |cell, light, stopped, rgb| {
+                    let (rgb, alpha) = mean_pixel(photo, [x, y], step);
+                    share(&met, alpha, &mut |cell, light, stopped| {
                         let to = &mut found[texel(cell)];
                         to.light += light;
                         to.reach += light;
@@ -250,11 +251,33 @@ fn optical_depth(cells: &Cells, cell: u32) -> f32 {
     -(1.0 - cells.opacity[cell as usize].min(OPAQUE)).ln()
 }
 
+/// Linear RGB, not premultiplied, and alpha of a photograph in the mean over a square `side` pixels
+/// wide about (x, y).
+fn mean_pixel(photo: &Photograph, [x, y]: [f64; 2], side: f64) -> ([f32; 3], f32) {
+    let [width, height] = photo.camera.size;
+    let range = |at: f64, n: u32| {
+        let from = ((at - 0.5 * side).round().max(0.0) as u32).min((at as u32).min(n - 1));
+        from..(from + (side as u32).max(1)).min(n)
+    };
+    let (mut sum, mut count) = ([0.0f32; 4], 0.0);
+    for row in range(y, height) {
+        for column in range(x, width) {
+            let [r, g, b, a] = photo.pixels[(row * width + column) as usize];
+            let alpha = f32::from(a) / 255.0;
+            for (to, v) in sum.iter_mut().zip([r, g, b].map(srgb8_to_linear)) {
+                *to += alpha * v;
+            }
+            sum[3] += alpha;
+            count += 1.0;
+        }
+    }
+    let scale = if sum[3] > 0.0 { 1.0 / sum[3] } else { 0.0 };
+    ([sum[0] * scale, sum[1] * scale, sum[2] * scale], sum[3] / count)
+}
+
 /// Shares what a pixel shows among the cells that its ray meets, given with their optical depths:
-/// `to` is told the light that reaches each cell, what it stops, and its linear RGB.
-fn share(met: &[(u32, f32)], [r, g, b, a]: [u8; 4], to: &mut dyn FnMut(u32, f32, f32, [f32; 3])) {
-    let rgb = [r, g, b].map(srgb8_to_linear);
-    let alpha = f32::from(a) / 255.0;
+/// `to` is told the light that reaches each cell, and what it stops of it.
+fn share(met: &[(u32, f32)], alpha: f32, to: &mut dyn FnMut(u32, f32, f32)) {
     let all: f32 = met.iter().map(|m| m.1).sum();
     let scale = -(1.0 - alpha.min(OPAQUE)).ln() / all;
     // What is behind an opaque front is unknown: it is made denser, but not thinner.
@@ -262,7 +285,7 @@ fn share(met: &[(u32, f32)], [r, g, b, a]: [u8; 4], to: &mut dyn FnMut(u32, f32,
     let mut light = 1.0;
     for &(cell, depth) in met {
         let stopped = light * (1.0 - (-scale * depth).exp());
-        to(cell, light, stopped, rgb);
+        to(cell, light, stopped);
         light -= stopped;
         if light < DARK {
             break;

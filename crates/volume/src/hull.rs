@@ -10,7 +10,7 @@ use rayon::prelude::*;
 const CELLS: u32 = 48;
 
 /// Times that the box is drawn tighter.
-const ROUNDS: u32 = 3;
+const ROUNDS: u32 = 4;
 
 /// The box around all places that every matte that shows them covers (A. Laurentini, "The visual
 /// hull concept for silhouette-based image understanding", 1994), and that at least half of the
@@ -20,7 +20,8 @@ const ROUNDS: u32 = 3;
 /// When there is no such place, naming photographs that stand against most others.
 pub(crate) fn bounds(photos: &[Photograph], mattes: &[Matte]) -> Result<[DVec3; 2], VolumeError> {
     let middle = nearest_to_axes(photos);
-    let reach = photos.iter().map(|p| reach(p, middle)).fold(f64::INFINITY, f64::min);
+    // The widest: a close-up shows a part of the tree only.
+    let reach = photos.iter().map(|p| reach(p, middle)).fold(0.0, f64::max);
     let mut cube = [middle - reach, middle + reach];
     for _ in 0..ROUNDS {
         let Some([low, high]) = occupied(photos, mattes, cube) else {
@@ -115,7 +116,7 @@ fn diagnosis(photos: &[Photograph], mattes: &[Matte], cube: [DVec3; 2]) -> Strin
     let names: Vec<String> =
         order.iter().take(3).map(|&i| format!("{} ({} cells)", photos[i].name, alone[i])).collect();
     match names.is_empty() {
-        true => format!("{what}; are poses, focal lengths and the up axis right?"),
+        true => format!("{what}; are poses and focal lengths right?"),
         false => format!("{what}; alone against all others: {}", names.join(", ")),
     }
 }

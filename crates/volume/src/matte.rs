@@ -37,26 +37,26 @@ impl Matte {
     }
 
     /// Whether anything is shown where `camera` sees the cube of half side `half` about `center`;
-    /// `None` if some of it lies outside of the picture or behind the camera.
+    /// `None` if the picture does not show all of it, and what it shows is empty.
     pub(crate) fn shows(&self, camera: &PhotoCamera, center: DVec3, half: f64) -> Option<bool> {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for corner in 0..8 {
             let sign = |k: i32| if corner >> k & 1 == 0 { -half } else { half };
             let (x, y, _) = camera.project(center + DVec3::new(sign(0), sign(1), sign(2)))?;
+            if !x.is_finite() || !y.is_finite() {
+                return None;
+            }
             low = [low[0].min(x), low[1].min(y)];
             high = [high[0].max(x), high[1].max(y)];
         }
-        let inside = (0..2).all(|k| low[k] >= 0.0 && high[k] <= f64::from(self.size[k]));
-        if !inside {
-            return None;
+        // `as` saturates below at 0.
+        let from = [0, 1].map(|k| (low[k].floor() as u32).min(self.size[k]));
+        let to = [0, 1].map(|k| (high[k].ceil() as u32).clamp(from[k], self.size[k]));
+        let whole = (0..2).all(|k| low[k] >= 0.0 && high[k] <= f64::from(self.size[k]));
+        match self.sum(from, to) > 0 {
+            true => Some(true),
+            false => whole.then_some(false),
         }
-        let from = low.map(|v| v.floor() as u32);
-        let to = [0, 1]
-            .map(|k| (high[k].ceil() as u32).clamp(from[k] + 1, self.size[k].max(from[k] + 1)));
-        if (0..2).any(|k| to[k] > self.size[k]) {
-            return None;
-        }
-        Some(self.sum(from, to) > 0)
     }
 }
 
@@ -81,6 +81,8 @@ mod tests {
         assert_eq!(shows(-1.5, 0.5), Some(true));
         assert_eq!(shows(-1.5, -0.5), Some(false));
         assert_eq!(shows(-3.9, 0.5), None);
+        // Partly outside, but the corner's pixel is seen.
+        assert_eq!(shows(4.1, -1.9), Some(true));
         assert_eq!(shows(9.0, 0.5), None);
     }
 }

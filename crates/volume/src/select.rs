@@ -64,7 +64,8 @@ pub struct Selection {
 }
 
 /// The nodes that represent the volume to `camera`, and the cameras of the bake to show them. Along
-/// every way from the root to a leaf of the tree the weights add up to 1. The order is exact for
+/// every way from the root to a leaf of the tree the weights add up to 1, but for cells nearer than
+/// four of their sides to a perspective eye, which fade, and what is behind it. The order is exact for
 /// every camera, also within the volume: no cell hides one that is drawn after it.
 pub fn select(block: &VolumeBlock, camera: &Camera, detail: Detail) -> Selection {
     let mut walk = Walk {
@@ -147,6 +148,12 @@ fn nearest_cameras(block: &VolumeBlock, camera: &Camera) -> Vec<CameraShare> {
     shown.filter(|c| c.share > 0.0).collect()
 }
 
+/// Weight of a cell by its distance along the axis, in its sides: billboards around the eye, huge
+/// and blurred, fade away as it passes through them.
+fn near_fade(sides: f64) -> f32 {
+    ((sides - 1.0) / 3.0).clamp(0.0, 1.0) as f32
+}
+
 struct Walk<'a> {
     block: &'a VolumeBlock<'a>,
     camera: &'a Camera,
@@ -170,8 +177,12 @@ impl Walk<'_> {
             0 => 1.0,
             _ => self.share(level, depth),
         };
-        if own > 0.0 {
-            self.items.push(Item { level, node: number, weight: weight * own });
+        let near = match self.camera.projection {
+            Projection::Orthographic { .. } => 1.0,
+            Projection::Perspective { .. } => near_fade(depth / lattice.cell_side(level)),
+        };
+        if own * near > 0.0 {
+            self.items.push(Item { level, node: number, weight: weight * own * near });
         }
         if own < 1.0 {
             self.children(level, node, center, weight * (1.0 - own));

@@ -65,7 +65,7 @@ struct Measured {
 /// Estimates the opacity of all cells.
 ///
 /// # Errors
-/// When no cell is covered in all mattes that see it.
+/// When no cell is covered in all mattes that see it, or all are next to transparent.
 pub(crate) fn estimate(
     lattice: &Lattice,
     photos: &[Photograph],
@@ -99,6 +99,11 @@ pub(crate) fn estimate(
             .zip(densities)
             .filter(|(_, density)| opacity(*density) > least)
             .collect();
+        if kept.is_empty() {
+            let what =
+                format!("no cell of level {} stops more than {least} of the light", level.level);
+            return Err(VolumeError::NothingToSee(what));
+        }
         (places, densities) = kept.into_iter().unzip();
         if !last {
             (places, densities) = refined(lattice, &places, &densities);

@@ -14,8 +14,9 @@ const MAX_ALL_TEXELS: u64 = 1 << 30;
 /// The first broken rule, with the field, the value and the limit.
 pub(crate) fn validate_header(h: &VolumeHeader) -> Result<(), String> {
     let numbers = h.corner.iter().chain(h.bounds.as_flattened());
-    if let Some(v) = numbers.clone().find(|v| !v.is_finite()) {
-        return Err(format!("a position is {v}; it must be finite"));
+    // Sums of positions stay finite too.
+    if let Some(v) = numbers.clone().find(|v| v.is_nan() || v.abs() >= 1e300) {
+        return Err(format!("a position is {v}; it must be within ±1e300"));
     }
     if !(h.side > 0.0 && h.side < 1e300) {
         return Err(format!("the side is {}; it must be above 0 and below 1e300", h.side));

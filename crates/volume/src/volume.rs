@@ -54,7 +54,7 @@ pub struct LevelCounts {
     pub cells: u64,
     /// Pairs of a cell and a camera: billboards before pruning.
     pub pairs: u64,
-    /// Of these, hidden from the camera.
+    /// Of these, pruned: hidden from the camera (and its neighbours), or within what is.
     pub hidden: u64,
     /// Of these, not hidden, but without anything to show.
     pub blank: u64,
@@ -244,7 +244,9 @@ fn cube(bounds: [DVec3; 2], branching: crate::Branching, levels: u32) -> Lattice
 fn cell_pixels(lattice: &Lattice, photos: &[Photograph]) -> f64 {
     let pixels = |p: &Photograph| {
         let depth = (lattice.middle() - p.camera.eye).dot(p.camera.forward);
-        lattice.cell_side(lattice.levels) * p.camera.pixels_per_area(depth.max(1e-9)).sqrt()
+        // A camera within the volume sees some of it larger than this.
+        let density = p.camera.pixels_per_area(depth.max(0.5 * lattice.side));
+        lattice.cell_side(lattice.levels) * density.sqrt()
     };
     photos.iter().map(pixels).fold(0.0, f64::max)
 }

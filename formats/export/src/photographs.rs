@@ -11,11 +11,14 @@ use serde_json::{Value, json};
 /// frame with its own intrinsics. The images lie beside the file.
 ///
 /// # Errors
-/// When a photograph is parallel, which the layout does not know.
+/// When a photograph is parallel, which the layout does not know, or its name is no file's.
 pub fn photographs(photos: &[Photograph]) -> Result<Vec<ExportFile>, ExportError> {
     let mut files = Vec::new();
     let mut frames = Vec::new();
     for photo in photos {
+        if photo.name.contains(['/', '\\']) {
+            return Err(ExportError::Unsuited(format!("{:?} is no file name", photo.name)));
+        }
         let name = format!("{}.png", photo.name);
         frames.push(frame(photo, &name)?);
         let [w, h] = photo.camera.size;

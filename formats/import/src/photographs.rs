@@ -28,14 +28,6 @@ impl Up {
             Self::Z => DVec3::new(v.x, v.z, -v.y),
         }
     }
-
-    /// The inverse of [`Up::to_y`].
-    pub fn from_y(self, v: DVec3) -> DVec3 {
-        match self {
-            Self::Y => v,
-            Self::Z => DVec3::new(v.x, -v.z, v.y),
-        }
-    }
 }
 
 /// A set of photographs, read.
@@ -54,6 +46,7 @@ pub struct CaptureSet {
 #[serde(default)]
 struct Intrinsics {
     camera_model: Option<String>,
+    is_fisheye: Option<bool>,
     camera_angle_x: Option<f64>,
     camera_angle_y: Option<f64>,
     fl_x: Option<f64>,
@@ -102,9 +95,19 @@ pub fn load_photographs(path: &Path, limits: &Limits, up: Up) -> Result<CaptureS
     if transforms.frames.is_empty() {
         return Err(source.invalid("frames", "there are none"));
     }
-    let mut photographs = Vec::new();
+    let frames = transforms.frames.len();
+    if frames > MOST_FRAMES {
+        return Err(source.invalid("frames", format!("{frames}; at most {MOST_FRAMES}")));
+    }
+    let (mut photographs, mut pixels) = (Vec::new(), 0);
     for (i, frame) in transforms.frames.iter().enumerate() {
-        photographs.push(photograph(&mut source, i, frame, &transforms.camera, up)?);
+        let photo = photograph(&mut source, i, frame, &transforms.camera, up)?;
+        pixels += photo.pixels.len() as u64;
+        if pixels > MOST_PIXELS {
+            let problem = format!("{pixels} pixels up to here; at most {MOST_PIXELS}");
+            return Err(source.invalid(format!("frame {i}"), problem));
+        }
+        photographs.push(photo);
     }
     let (hash, warnings) = source.finish();
     Ok(CaptureSet { photographs, hash, warnings })
@@ -138,6 +141,16 @@ fn photograph(
     let pixels = rgba.pixels().map(|p| p.0).collect();
     Ok(Photograph { name: frame.file_path.clone(), camera, pixels })
 }
+
+/// Focal lengths and centres in sides of the image at most.
+const MOST_SIDES: f64 = 1e4;
+
+/// Distortion terms at most.
+const MOST_DISTORTION: f64 = 1e3;
+
+/// Frames at most, and pixels of all of them: 4 GiB.
+const MOST_FRAMES: usize = 4096;
+const MOST_PIXELS: u64 = 1 << 30;
 
 /// Largest deviation of a pose's axes from unit length and right angles.
 const POSE_TOLERANCE: f64 = 1e-3;
@@ -177,6 +190,7 @@ impl Intrinsics {
         let or = |a: Option<f64>, b: Option<f64>| a.or(b);
         Self {
             camera_model: self.camera_model.clone().or_else(|| common.camera_model.clone()),
+            is_fisheye: self.is_fisheye.or(common.is_fisheye),
             camera_angle_x: or(self.camera_angle_x, common.camera_angle_x),
             camera_angle_y: or(self.camera_angle_y, common.camera_angle_y),
             fl_x: or(self.fl_x, common.fl_x),
@@ -205,6 +219,9 @@ impl Intrinsics {
         let model = self.camera_model.as_deref().unwrap_or("OPENCV");
         if !["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL"].contains(&model) {
             return Err(source.unsupported(format!("{element}: the camera model {model:?}")));
+        }
+        if self.is_fisheye == Some(true) {
+            return Err(source.unsupported(format!("{element}: a fisheye camera (is_fisheye)")));
         }
         if [self.k3, self.k4].iter().flatten().any(|k| *k != 0.0) {
             return Err(
@@ -250,6 +267,16 @@ impl Intrinsics {
             Distortion { k: [zero(self.k1), zero(self.k2)], p: [zero(self.p1), zero(self.p2)] };
         let center =
             [self.cx.map_or(0.5 * w, |c| c * scale), self.cy.map_or(0.5 * h, |c| c * scale)];
+        let side = w.max(h);
+        let far = |v: f64| !v.is_finite() || v.abs() > MOST_SIDES * side;
+        if let Some(v) = focal.into_iter().chain(center).find(|v| far(*v)) {
+            let most = MOST_SIDES * side;
+            return invalid(format!("a focal length or centre of {v} pixels; at most {most}"));
+        }
+        let terms = distortion.k.into_iter().chain(distortion.p);
+        if let Some(v) = terms.into_iter().find(|v| v.abs() > MOST_DISTORTION) {
+            return invalid(format!("a distortion of {v}; at most {MOST_DISTORTION}"));
+        }
         Ok(Optics::Pinhole { focal, center, distortion })
     }
 }

@@ -23,7 +23,7 @@ const CURVES: [(&str, Space, Centers); 3] = [
     ("Lab, modified", Space::Lab, Centers::Nearest),
 ];
 
-/// Heights of the tree in pixels, and the levels that are looked at there.
+/// Height of the tree in pixels.
 const HEIGHT: u32 = 256;
 
 /// A way to prune, and what it gave.
@@ -49,7 +49,8 @@ struct Coded {
 
 pub(crate) struct Study {
     triangles: usize,
-    seconds: [f64; 4],
+    /// All, photographing, opacity.
+    seconds: [f64; 3],
     pruned: Vec<Pruned>,
     raw_bytes: u64,
     node_bytes: u64,
@@ -143,7 +144,7 @@ pub(crate) fn of(soup: &TriangleSoup) -> Result<Study> {
     let all = start.elapsed().as_secs_f64();
     let r = &reference.report;
     let [finest, coarser] = r.billboards.map(|d| d.as_secs_f64());
-    let seconds = [all, r.photographs.as_secs_f64(), r.opacity.as_secs_f64(), 0.0];
+    let seconds = [all, r.photographs.as_secs_f64(), r.opacity.as_secs_f64()];
     let (raw_pack, raw_report) = write_volume(&reference, None)?;
     let (raw, drawn) = judge.errors(&raw_pack, default.levels, HEIGHT)?;
     let mut pruned = vec![Pruned {

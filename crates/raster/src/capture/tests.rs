@@ -168,7 +168,7 @@ fn deep_pictures_know_each_slab_and_agree_with_the_flat_one() {
     let camera = Camera::new(DVec3::new(0.0, 0.0, 5.0), -DVec3::Z, projection, [32, 32]);
     let mut buffers = Buffers::default();
     let flat = scene.capture(&camera, 1, &mut buffers).picture;
-    let deep = scene.deep(&camera, 0.5, &mut buffers);
+    let deep = scene.deep(&camera, 0.6, &mut buffers);
     let mut seen = 0;
     for pixel in 0..32 * 32 {
         let hits = deep.hits(pixel);

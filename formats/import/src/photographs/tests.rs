@@ -88,6 +88,11 @@ fn what_is_wrong_is_named() {
     says(&json(r#""fl_x": 9, "w": 16, "h": 16"#, ""), &["8×6", "16×16"]);
     says(&json(r#""fl_x": 9, "camera_model": "OPENCV_FISHEYE""#, ""), &["OPENCV_FISHEYE"]);
     says(&json(r#""fl_x": 9, "k3": 0.5"#, ""), &["k3"]);
+    says(&json(r#""fl_x": 9, "is_fisheye": true"#, ""), &["fisheye"]);
+    says(&json(r#""fl_x": 1e308, "w": 1, "h": 0.75"#, ""), &["1", "pixels"]);
+    says(&json(r#""fl_x": 1e308, "w": 2, "h": 1.5"#, ""), &["inf", "80000"]);
+    says(&json(r#""fl_x": 9, "cx": -1e9"#, ""), &["-1000000000", "80000"]);
+    says(&json(r#""fl_x": 9, "p2": 1e308"#, ""), &["distortion", "1000"]);
     says(&json(angle, "").replace("[0,0,-1,-5]", "[0,0,-1]"), &["frame 0", "rows of 4"]);
     says(&json(angle, "").replace("[1,0,0,0]", "[1,0.2,0,0]"), &["rotation", "1e-3"]);
     says(&json(angle, "").replace("[1,0,0,0]", "[-1,0,0,0]"), &["mirrors"]);
