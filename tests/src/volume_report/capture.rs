@@ -18,9 +18,9 @@ const HELD_OUT: u32 = 8;
 /// Photographs that are shown.
 const SHOWN: usize = 3;
 
-/// Cells as wide as a pixel or two.
+/// Cells six pixels wide: texels of a pixel and a half.
 fn options() -> VolumeOptions {
-    VolumeOptions { levels: 7, ..VolumeOptions::default() }
+    VolumeOptions { levels: 6, ..VolumeOptions::default() }
 }
 
 struct Scene<'a> {
