@@ -164,7 +164,7 @@ fn pictures_of_every_level_keep_the_coverage() {
             for level in 1..=levels {
                 let picture = drawn(&block, &camera, Detail::Level(level), Blending::Shares);
                 let off = picture.mean_coverage() / want - 1.0;
-                // Loose leaves at random are the hardest: trees stay within 3 % (docs/VOLUME.md).
+                // Loose leaves at random are hard; how trees fare is in docs/VOLUME.md.
                 assert!(off.abs() < 0.12, "{branching:?} level {level} {from}: {off:+.3}");
             }
         }

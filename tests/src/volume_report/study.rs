@@ -153,14 +153,11 @@ pub(crate) fn of(soup: &TriangleSoup) -> Result<Study> {
         drawn,
         errors: raw,
     }];
-    for (name, prune, prune_by) in
-        [("none", 1.0, Prune::Neighbours), ("camera alone (the paper's), 0.98", 0.98, Prune::Own)]
-    {
-        let made = volume(soup, &surfaces, &VolumeOptions { prune, prune_by, ..default })?;
-        let (errors, drawn) =
-            judge.errors(&write_volume(&made, None)?.0, default.levels, HEIGHT)?;
-        pruned.push(Pruned { name, levels: drawn_levels(&made), drawn, errors });
-    }
+    let own = VolumeOptions { prune_by: Prune::Own, ..default };
+    let made = volume(soup, &surfaces, &own)?;
+    let (errors, drawn) = judge.errors(&write_volume(&made, None)?.0, default.levels, HEIGHT)?;
+    let levels = drawn_levels(&made);
+    pruned.push(Pruned { name: "camera alone (the paper's), 0.98", levels, drawn, errors });
     let mut coded = Vec::new();
     for (curve, &(_, space, centers)) in CURVES.iter().enumerate() {
         for words in WORDS {
