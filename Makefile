@@ -7,6 +7,7 @@
 #   make report   evaluate the trees; writes docs/REPORT.md, the README's figures, out/report/*.html
 #   make views    measure views; writes docs/VIEWS.md and docs/views.svg
 #   make volume   measure volumes; writes docs/VOLUME.md, docs/volume.svg, docs/volume_heldout.png
+#   make view     measure the viewer; writes docs/VIEWER.md and the README's pictures of it
 #   make codebooks  codebook training beside faiss and scikit-learn, if $PYTHON has them; writes docs/CODEBOOKS.md
 #   make three    draw exported views in three.js, in a headless browser; writes docs/three.png
 #   make picture  draw the README's picture anew
@@ -19,7 +20,13 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+.PHONY: gpu screen view demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+
+# Installs what variable `missing` of a recipe's shell names, or says what to install.
+INSTALL = if [ -n "$$missing" ]; then \
+  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+    echo "installing:$$missing"; apt-get update -qq && apt-get install -y -qq $$missing; \
+  else echo "install these packages first: sudo apt-get install$$missing"; exit 1; fi; fi
 
 # What the build needs from the system: a linker with C and C++ compilers, for zstd and meshoptimizer.
 setup:
@@ -28,12 +35,26 @@ setup:
 	command -v cc >/dev/null || missing="$$missing gcc"; \
 	command -v c++ >/dev/null || missing="$$missing g++"; \
 	echo '#include <stdlib.h>' | cc -E - >/dev/null 2>&1 || missing="$$missing libc6-dev"; \
-	if [ -n "$$missing" ]; then \
-	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	    echo "installing:$$missing"; apt-get update -qq && apt-get install -y -qq $$missing; \
-	  else echo "install these packages first: sudo apt-get install$$missing"; exit 1; fi; fi
+	$(INSTALL)
 
-demo: setup
+# A Vulkan driver for forest-view: Mesa's software one, where there is no graphics card's.
+gpu: setup
+	@missing=; \
+	ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json 2>/dev/null | grep -q . \
+	  || missing="$$missing mesa-vulkan-drivers"; \
+	ldconfig -p 2>/dev/null | grep -q "libvulkan.so.1 " || missing="$$missing libvulkan1"; \
+	$(INSTALL)
+
+# A virtual screen, and what windows are made with: for the tests of forest-view's.
+screen: setup
+	@missing=; \
+	command -v Xvfb >/dev/null || missing="$$missing xvfb"; \
+	for pair in libX11.so.6:libx11-6 libX11-xcb.so.1:libx11-xcb1 libXcursor.so.1:libxcursor1 \
+	    libXi.so.6:libxi6 libxkbcommon-x11.so.0:libxkbcommon-x11-0; do \
+	  ldconfig -p 2>/dev/null | grep -q "$${pair%:*} " || missing="$$missing $${pair#*:}"; done; \
+	$(INSTALL)
+
+demo: gpu
 	$(CARGO) build --release --workspace --bins
 	@mkdir -p $(OUT)
 	@for tree in conifer.glb broadleaf_young.gltf shrub.obj; do \
@@ -56,12 +77,16 @@ demo: setup
 	@target/release/forest-bake verify $(OUT)/conifer.fpack
 	@target/release/forest-bake draw $(OUT)/conifer.fpack -o $(OUT)/conifer-volume.png --as volume \
 	  --level 7,6,5,4 --view 25,12 -q
+	@for what in points views volume; do \
+	  target/release/forest-view $(OUT)/conifer.fpack --headless -o $(OUT)/view-$$what.png --as $$what \
+	    --view 25,12 --size 720x720 || exit 1; done
 	@target/release/forest-bake levels sample-data/conifer.glb > $(OUT)/conifer-levels.txt
 	@target/release/forest-bake inspect $(OUT)/block.fpack
 	@echo; echo "Packs:    $(OUT)/*.fpack"; \
 	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together;"; \
 	echo "          conifer-views.png: from 289 directions; conifer-lookup.png: nearest, blended, through depth;"; \
-	echo "          conifer-volume.png: four levels of billboards)"; \
+	echo "          conifer-volume.png: four levels of billboards; view-*.png: the viewer's)"; \
+	echo "Window:   target/release/forest-view $(OUT)/conifer.fpack"; \
 	echo "Export:   $(OUT)/conifer-three (for three.js)"; \
 	echo "Report:   $(OUT)/conifer-levels.txt (what each radius rule and order keeps, by level)"
 
@@ -71,7 +96,7 @@ check: setup
 	$(CARGO) clippy --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --quiet
 
-test: check
+test: check gpu screen
 	$(CARGO) build --workspace --bins
 	$(CARGO) test --workspace
 
@@ -94,6 +119,10 @@ volume: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/volumes
 
+view: gpu screen
+	$(CARGO) build --release --workspace --bins
+	target/release/viewer
+
 codebooks: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/codebooks > docs/CODEBOOKS.md.new && mv docs/CODEBOOKS.md.new docs/CODEBOOKS.md
@@ -104,10 +133,7 @@ three: setup
 	@missing=; \
 	command -v npm >/dev/null || missing="$$missing nodejs npm"; \
 	command -v chromium >/dev/null || [ -n "$$CHROMIUM" ] || missing="$$missing chromium"; \
-	if [ -n "$$missing" ]; then \
-	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
-	    echo "installing:$$missing"; apt-get update -qq && apt-get install -y -qq $$missing; \
-	  else echo "install these packages first: sudo apt-get install$$missing"; exit 1; fi; fi
+	$(INSTALL)
 	$(CARGO) build --release --workspace --bins
 	@mkdir -p $(OUT)
 	cd tests/three && npm install --no-package-lock --no-audit --no-fund --silent

@@ -49,7 +49,31 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-draw",
         ],
     ),
+    (
+        "forest-gpu",
+        &[
+            "forest-soup",
+            "forest-raster",
+            "forest-pack",
+            "forest-points",
+            "forest-views",
+            "forest-volume",
+        ],
+    ),
     ("forest-sample-data", &["forest-soup"]),
+    (
+        "forest-view",
+        &[
+            "forest-soup",
+            "forest-pack",
+            "forest-import",
+            "forest-points",
+            "forest-raster",
+            "forest-views",
+            "forest-volume",
+            "forest-gpu",
+        ],
+    ),
     (
         "forest-bake",
         &[
@@ -80,6 +104,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-export",
             "forest-sample-data",
             "forest-vq",
+            "forest-gpu",
         ],
     ),
 ];

@@ -6,11 +6,13 @@ mod cli; // the program: usage, exit codes, what it prints, what it leaves behin
 mod eval; // packs against their sources: reports, calibration, chosen levels
 mod fuzz_corpus; // inputs that fuzzing found or started from
 mod goldens; // committed packs: read, damaged, baked again
+mod gpu; // the graphics device against the CPU renderer, sample by sample
 mod ground_truth; // the pictures that packs are judged against: two ways, and another's
 mod hard_cases; // degenerate and extreme soups, each with its expected number
 mod invariance; // threads, places and scales that must not matter
 mod real_trees; // trees by others, where they are present
-mod support;
-mod views;
-mod views_export; // temporary folders, running the program
+mod support; // temporary folders, running the program
+mod view; // forest-view: pictures, window, exit codes
+mod views; // views: what the program bakes, hard cases
+mod views_export; // what engines read // temporary folders, running the program
 mod volume; // volumes: from meshes and photographs, order, hard cases

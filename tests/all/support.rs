@@ -13,7 +13,9 @@ pub(crate) fn forest_bake() -> Command {
         let folder = exe.ancestors().nth(2).expect("a target folder");
         let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
         let mut build = std::process::Command::new(cargo);
-        build.args(["build", "--quiet", "--workspace", "--bins"]).current_dir(repo("."));
+        build
+            .args(["build", "--quiet", "--workspace", "--bins", "--examples"])
+            .current_dir(repo("."));
         if folder.ends_with("release") {
             build.arg("--release");
         }

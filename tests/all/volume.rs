@@ -1,14 +1,14 @@
 //! Volumes: what the shipped program bakes, drawing order, photographs, hard cases.
 
 use crate::support::{arg, inspect, repo, run, succeed};
-use forest_draw::{Blending, VolumeScene};
+use forest_draw::VolumeScene;
 use forest_pack::{Pack, kind};
 use forest_raster::{Picture, Sampling, Style, Surfaces, rasterize};
 use forest_soup::{AlphaMode, Camera, Material, PhotoCamera, Photograph, Projection, TriangleSoup};
 use forest_tests::soups::{leaves, of_triangles};
 use forest_tests::{bake_volume, open, write_volume};
 use forest_volume::{
-    Branching, Coarse, CodebookOptions, CodebookSize, Coding, Detail, Prune, Stand,
+    Blending, Branching, Coarse, CodebookOptions, CodebookSize, Coding, Detail, Prune, Stand,
     TomographyOptions, Volume, VolumeBlock, VolumeError, VolumeOptions, select,
 };
 use glam::{DVec3, Vec3};

@@ -1,11 +1,13 @@
 //! What tests, the golden packs and the fuzz targets share.
 
 pub mod golden;
+pub mod pictures;
 pub mod reference;
 pub mod reports;
+pub mod screen;
 pub mod soups;
 
-use forest_draw::{Blending, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{ErrorKind, Light, Measures, Need};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
@@ -16,7 +18,7 @@ use forest_raster::{CaptureScene, Sampling, Style, Surfaces};
 use forest_soup::{Camera, Projection, TriangleSoup};
 use forest_views::{Frame, Lookup, ViewsBlock, ViewsError, ViewsOptions};
 use forest_volume::{
-    CodebookOptions, Detail, Stand, Volume, VolumeBlock, VolumeError, VolumeOptions,
+    Blending, CodebookOptions, Detail, Stand, Volume, VolumeBlock, VolumeError, VolumeOptions,
 };
 use glam::DVec3;
 use std::path::{Path, PathBuf};

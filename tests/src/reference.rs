@@ -54,6 +54,7 @@ pub fn reference(folder: &Path, view: &str, kind: &str) -> Reference {
         sun: [(json["sun_energy"].as_f64().unwrap() / std::f64::consts::PI) as f32; 3],
         sky: vector(&json["world_rgb"]).to_array().map(|c| (c * strength) as f32),
         translucency: 0.0,
+        darkest: 1.0,
     };
     Reference { pixels: pixels.collect(), camera, sun }
 }

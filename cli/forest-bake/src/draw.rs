@@ -4,14 +4,14 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use anyhow::{Context, Result, bail};
-use forest_draw::{Blending, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
 use forest_raster::{Picture, Sampling, Style};
-use forest_soup::{Camera, Projection};
+use forest_soup::{Camera, named_view};
 use forest_views::{Lookup, ViewsBlock, select};
-use forest_volume::{Detail, VolumeBlock};
+use forest_volume::{Blending, Detail, VolumeBlock};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
 use std::io::Cursor;
@@ -299,54 +299,14 @@ impl Args {
     }
 
     /// A camera on the box from `min` to `max`.
-    fn camera(&self, [min, max]: [DVec3; 2]) -> Result<Camera> {
-        let [yaw, pitch] = match self.view.as_str() {
-            "front" => [0.0, 0.0],
-            "right" => [90.0, 0.0],
-            "back" => [180.0, 0.0],
-            "left" => [-90.0, 0.0],
-            "top" => [0.0, 90.0],
-            "diagonal" => [45.0, 30.0],
-            text => {
-                let parts: Option<Vec<f64>> = text.split(',').map(|v| v.parse().ok()).collect();
-                let angles = parts.and_then(|v| <[f64; 2]>::try_from(v).ok());
-                let wrong = || Usage(format!("--view {text:?}: a name or YAW,PITCH in degrees"));
-                angles.filter(|a| a.iter().all(|v| v.is_finite())).ok_or_else(wrong)?
-            }
-        };
-        let (yaw, pitch) = (f64::to_radians(yaw), f64::to_radians(pitch));
-        let from = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos());
-        let (center, radius) = ((min + max) * 0.5, (max - min).length() * 0.5);
-        let size = [self.size; 2];
-        let corners: [DVec3; 8] = std::array::from_fn(|i| {
-            let pick = |k: usize| if i >> k & 1 == 0 { min[k] } else { max[k] };
-            DVec3::new(pick(0), pick(1), pick(2)) - center
-        });
-        Ok(match self.distance {
-            None => {
-                let height = 1.04 * extent(&corners, from).max(1e-9 * radius);
-                let eye = center + from * (2.0 * radius);
-                Camera::new(eye, -from, Projection::Orthographic { height }, size)
-            }
-            Some(d) if d.is_finite() && d > 0.0 => {
-                let fov_y = if d > 1.05 { 2.0 * (1.0 / d).asin() } else { 1.2 };
-                let eye = center + from * (d * radius);
-                Camera::new(eye, -from, Projection::Perspective { fov_y }, size)
-            }
-            Some(d) => return Err(Usage(format!("--distance {d}: must be positive")).into()),
-        })
+    fn camera(&self, bounds: [DVec3; 2]) -> Result<Camera> {
+        if let Some(d) = self.distance.filter(|d| !(d.is_finite() && *d > 0.0)) {
+            return Err(Usage(format!("--distance {d}: must be positive")).into());
+        }
+        let wrong = || Usage(format!("--view {:?}: a name or YAW,PITCH in degrees", self.view));
+        let angles = named_view(&self.view).ok_or_else(wrong)?;
+        Ok(Camera::around(bounds, angles, self.distance, [self.size; 2]))
     }
-}
-
-/// The larger side of the picture of a box, seen from direction `from`.
-fn extent(corners: &[DVec3; 8], from: DVec3) -> f64 {
-    let camera = Camera::new(DVec3::ZERO, -from, Projection::Orthographic { height: 1.0 }, [1, 1]);
-    let along = |axis: DVec3| {
-        let at = corners.map(|c| c.dot(axis));
-        at.into_iter().fold(f64::NEG_INFINITY, f64::max)
-            - at.into_iter().fold(f64::INFINITY, f64::min)
-    };
-    along(camera.right).max(along(camera.up))
 }
 
 /// All pictures side by side, written whole or not at all.

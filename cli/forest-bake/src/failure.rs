@@ -38,14 +38,10 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
         return Some(2);
     }
     if let Some(e) = cause.downcast_ref::<ImportError>() {
-        return Some(match e {
-            ImportError::Io { .. } => 2,
-            ImportError::Unsupported { .. } => 5,
-            _ => 3,
-        });
+        return Some(e.exit_code());
     }
     if let Some(e) = cause.downcast_ref::<PackError>() {
-        return Some(pack(e));
+        return Some(e.exit_code());
     }
     if let Some(e) = cause.downcast_ref::<BakeError>() {
         return Some(bake(e));
@@ -53,7 +49,7 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
     if let Some(e) = cause.downcast_ref::<ViewsError>() {
         return Some(match e {
             ViewsError::Options(_) => 1,
-            ViewsError::Pack(e) => pack(e),
+            ViewsError::Pack(e) => e.exit_code(),
             ViewsError::Soup(_) | ViewsError::NothingToSee => 3,
             _ => 4,
         });
@@ -61,14 +57,14 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
     if let Some(e) = cause.downcast_ref::<VolumeError>() {
         return Some(match e {
             VolumeError::Options(_) => 1,
-            VolumeError::Pack(e) => pack(e),
+            VolumeError::Pack(e) => e.exit_code(),
             VolumeError::Soup(_) | VolumeError::NothingToSee(_) | VolumeError::Inconsistent(_) => 3,
             _ => 4,
         });
     }
     if let Some(e) = cause.downcast_ref::<ExportError>() {
         return Some(match e {
-            ExportError::Pack(e) => pack(e),
+            ExportError::Pack(e) => e.exit_code(),
             ExportError::Unsuited(_) => 5,
             _ => 4,
         });
@@ -78,7 +74,7 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
             EvalError::Plan { .. } => 1,
             EvalError::Temporary(_) => 2,
             EvalError::Lens(_) => 5,
-            EvalError::Pack(e) => pack(e),
+            EvalError::Pack(e) => e.exit_code(),
             EvalError::Bake(e) => bake(e),
             EvalError::Soup(_) | EvalError::NothingToSee | EvalError::Unseen { .. } => 3,
             _ => 4,
@@ -90,16 +86,8 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
 fn bake(e: &BakeError) -> u8 {
     match e {
         BakeError::Option { .. } => 1,
-        BakeError::Pack(e) => pack(e),
+        BakeError::Pack(e) => e.exit_code(),
         BakeError::TooManyPoints(_) => 4,
-        _ => 3,
-    }
-}
-
-fn pack(e: &PackError) -> u8 {
-    match e {
-        PackError::Io { .. } => 2,
-        PackError::Unsupported { .. } => 5,
         _ => 3,
     }
 }

@@ -52,16 +52,5 @@ pub(crate) fn check_target(path: &Path, extension: &str) -> Result<()> {
 
 /// Writes a file whole or not at all.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let name = || path.display().to_string();
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let mut file = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = file.tempfile_in(folder.unwrap_or(Path::new("."))).with_context(name)?;
-    file.write_all(bytes).with_context(name)?;
-    file.persist(path).map_err(|e| e.error).with_context(name)?;
-    Ok(())
+    forest_pack::write_whole(path, bytes).with_context(|| path.display().to_string())
 }

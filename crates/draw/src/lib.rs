@@ -43,4 +43,4 @@ mod volume;
 pub use points::{Drawn, PointsFrame, draw_points, point_ellipses, read_surfaces};
 pub use subject::PointsSubject;
 pub use views::{ViewsDrawn, ViewsLevel};
-pub use volume::{Blending, VolumeDrawn, VolumeScene};
+pub use volume::{VolumeDrawn, VolumeScene};

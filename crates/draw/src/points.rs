@@ -79,7 +79,7 @@ impl<'a> PointsFrame<'a> {
         let all = &|_| true;
         let mut list = DisplayList::of_ellipses(point_ellipses(block, &cut, camera, style, all));
         if let Some(surfaces) = surfaces {
-            triangles(block, &cut, camera, surfaces, &mut list);
+            triangles(block, &cut, camera, surfaces, style, &mut list);
         }
         let points = cut.points(block).count() as u64;
         let drawn = Drawn { points, triangles: cut.triangle_count() };
@@ -156,7 +156,8 @@ fn ellipse(
     let f = Footprint::new(center, radius, p.flatness_step(), axis, to_eye, plane);
     // The axis has no sign: it is the side that is seen.
     let normal = if axis.dot(to_eye) < 0.0 { -axis } else { axis }.as_vec3();
-    let light = style.light.unshadowed(normal);
+    let sunlit = style.light.seen(world - block.middle(), block.half_diagonal());
+    let light = style.light.factors(normal, sunlit, 1.0);
     let color = p.color();
     Some(Ellipse {
         id,
@@ -176,6 +177,7 @@ fn triangles<'s>(
     cut: &Cut,
     camera: &Camera,
     surfaces: &'s Surfaces,
+    style: &Style,
     list: &mut DisplayList<'s>,
 ) {
     let projector = Projector::new(camera, near(block));
@@ -185,7 +187,7 @@ fn triangles<'s>(
         let cell = &block.cells[c.cell as usize];
         for i in c.triangles.clone() {
             let t = &block.triangles[i as usize];
-            let corners = corners(block, cell, i as usize, t);
+            let corners = corners(block, cell, i as usize, t, style);
             list.triangle(&projector, surfaces, t.material, first_id.wrapping_add(i), corners);
         }
     }
@@ -197,6 +199,7 @@ fn corners(
     cell: &CellRecord,
     index: usize,
     t: &TriangleRecord,
+    style: &Style,
 ) -> [Corner; 3] {
     let range = block.header.uv_ranges[t.material as usize];
     let colors = block.triangle_colors.get(index);
@@ -207,8 +210,10 @@ fn corners(
             let [r, g, b] = [r, g, b].map(srgb8_to_linear);
             [r, g, b, f32::from(a) / 255.0]
         });
+        let position = block.to_world(block.position(cell, v.position));
         Corner {
-            position: block.to_world(block.position(cell, v.position)),
+            position,
+            sunlit: style.light.seen(position - block.middle(), block.half_diagonal()),
             normal: decode_axis(v.normal).as_vec3(),
             uv: Vec2::from_array(range.decode(v.uv)),
             color,

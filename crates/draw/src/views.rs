@@ -1,10 +1,10 @@
 //! The views representation: a square of samples, each a ray through one to three views.
 
 use forest_pack::PackError;
-use forest_raster::{DisplayList, Picture, Sprite, SpriteHit, Style, covers, draw};
+use forest_raster::{DisplayList, Light, Picture, Sprite, SpriteHit, Style, covers, draw};
 use forest_soup::{Camera, Projection};
 use forest_views::{
-    Blend, Channel, Found, Hit, Lookup, Ray, Texels, ViewSampler, ViewsBlock, views,
+    Blend, COVER, Found, Hit, Lookup, PICK, Ray, Texels, ViewSampler, ViewsBlock, views,
 };
 use glam::{DVec3, IVec2};
 use std::sync::Arc;
@@ -48,29 +48,16 @@ impl<'a> ViewsLevel<'a> {
     /// Draws the tree as `camera` sees it.
     pub fn draw(&self, camera: &Camera, lookup: Lookup, style: &Style) -> (Picture, ViewsDrawn) {
         let chosen = views(self.block, camera, lookup);
-        let impostor = Arc::new(Impostor::new(self, camera, lookup, chosen));
+        let impostor = Arc::new(Impostor::new(self, camera, lookup, chosen, style.light));
         let mut list = DisplayList::default();
         list.sprite(impostor);
         (draw(&list, camera, style), self.drawn(lookup, &chosen))
     }
 
     fn drawn(&self, lookup: Lookup, chosen: &Blend) -> ViewsDrawn {
-        let used: Vec<u32> = chosen.iter().filter(|v| v.1 > 0.0).map(|v| v.0).collect();
-        let header = &self.block.header;
-        let texel: u64 = Channel::ALL
-            .into_iter()
-            .filter(|c| header.channels.has(*c))
-            // Base colours need no light.
-            .filter(|c| {
-                matches!((c, lookup), (Channel::Color, _) | (Channel::Depth, Lookup::Depth))
-            })
-            .map(|c| c.block_bytes(header.quality))
-            .sum();
-        let blocks = |v: &u32| {
-            let t = &self.block.tiles[self.level][*v as usize];
-            u64::from(t.width / 4) * u64::from(t.height / 4)
-        };
-        ViewsDrawn { views: used.len() as u64, bytes: used.iter().map(blocks).sum::<u64>() * texel }
+        let used = chosen.iter().filter(|v| v.1 > 0.0);
+        let bytes = used.clone().map(|v| self.block.tile_bytes(self.level, v.0, lookup)).sum();
+        ViewsDrawn { views: used.count() as u64, bytes }
     }
 }
 
@@ -87,21 +74,24 @@ struct Impostor<'a> {
     pixels: (IVec2, IVec2),
     /// Depth of the front of the ball that holds the tree.
     nearest: f64,
+    light: Light,
+    half_diagonal: f64,
 }
 
-/// Numbers for the hash rule: which view shows a sample, and whether its texel covers it.
-const PICK: u32 = 0x7669_6577;
-const COVER: u32 = 0x636f_7672;
-
 impl<'a> Impostor<'a> {
-    fn new(level: &'a ViewsLevel, camera: &'a Camera, lookup: Lookup, chosen: Blend) -> Self {
+    fn new(
+        level: &'a ViewsLevel,
+        camera: &'a Camera,
+        lookup: Lookup,
+        chosen: Blend,
+        light: Light,
+    ) -> Self {
         let header = &level.block.header;
         let center = level.block.center();
         let lookup = match lookup {
             Lookup::Depth if !header.channels.depth => Lookup::Blend,
             other => other,
         };
-        let side = f64::from(level.side());
         let sampler = |&(view, share): &(u32, f32)| {
             (ViewSampler::new(level.block, &level.texels, level.level, view), share)
         };
@@ -112,9 +102,10 @@ impl<'a> Impostor<'a> {
             views: chosen.iter().filter(|v| v.1 > 0.0).map(sampler).collect(),
             half: header.half,
             eye: (camera.eye - center) / header.half,
-            // Texels are blurred by their width: those at the edge reach out of the ball.
-            pixels: ball_pixels(camera, center, header.radius + 4.0 * header.half / side),
+            pixels: level.block.pixels(camera, level.level),
             nearest: depth - header.radius,
+            light,
+            half_diagonal: level.block.half_diagonal(),
         }
     }
 
@@ -174,35 +165,6 @@ impl<'a> Impostor<'a> {
     }
 }
 
-/// First and last pixel of the box around a ball's picture.
-fn ball_pixels(camera: &Camera, center: DVec3, radius: f64) -> (IVec2, IVec2) {
-    let to = center - camera.eye;
-    let (depth, aside) = (to.dot(camera.forward), [to.dot(camera.right), -to.dot(camera.up)]);
-    let middle = [camera.width, camera.height].map(|n| f64::from(n) * 0.5);
-    let scale = camera.pixels_per_unit(1.0);
-    let ends = |k: usize| match camera.projection {
-        Projection::Orthographic { .. } => {
-            Some([aside[k] - radius, aside[k] + radius].map(|v| middle[k] + v * scale))
-        }
-        // The angles of the two tangents in the plane of this axis.
-        Projection::Perspective { .. } => {
-            let (angle, distance) = (aside[k].atan2(depth), aside[k].hypot(depth));
-            let half = (radius / distance).min(1.0).asin();
-            let seen = distance > radius && angle.abs() + half < std::f64::consts::FRAC_PI_2;
-            seen.then(|| [angle - half, angle + half].map(|a| middle[k] + a.tan() * scale))
-        }
-    };
-    match (ends(0), ends(1)) {
-        (Some(x), Some(y)) => {
-            let pixel = |i: usize| IVec2::new(x[i].floor() as i32, y[i].floor() as i32);
-            (pixel(0), pixel(1))
-        }
-        // Around the eye, or reaching behind it: anywhere.
-        _ if depth > -radius => (IVec2::MIN, IVec2::MAX),
-        _ => (IVec2::ONE, IVec2::ZERO),
-    }
-}
-
 /// A number in `0..1` for each sample, by the hash rule of opacity.
 fn uniform(id: u32, (x, y): (u32, u32)) -> f32 {
     forest_raster::sample_hash(id, x, y)
@@ -220,7 +182,8 @@ impl Sprite for Impostor<'_> {
     fn sample(&self, x: f64, y: f64, grid: (u32, u32)) -> Option<SpriteHit> {
         let ray = self.ray(x, y);
         let hit = self.find(&ray, grid)?;
-        let place = (ray.origin + ray.direction * hit.distance - self.eye) * self.half;
+        let at = ray.origin + ray.direction * hit.distance;
+        let place = (at - self.eye) * self.half;
         let depth = place.dot(self.camera.forward);
         let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
         if perspective && depth <= 0.0 {
@@ -229,6 +192,7 @@ impl Sprite for Impostor<'_> {
         // On the side that is seen: views a few degrees off may see the other.
         let normal = hit.normal;
         let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-        Some(SpriteHit { depth, rgb: hit.rgb, normal: normal.as_vec3(), sky: hit.sky })
+        let sunlit = self.light.seen(at * self.half, self.half_diagonal);
+        Some(SpriteHit { depth, rgb: hit.rgb, normal: normal.as_vec3(), sunlit, sky: hit.sky })
     }
 }

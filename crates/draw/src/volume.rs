@@ -3,18 +3,10 @@
 use forest_pack::PackError;
 use forest_raster::{Layer, Picture, Sampling, composite};
 use forest_soup::{Camera, srgb8_to_linear};
-use forest_volume::{CameraShare, Detail, Item, Selection, VolumeBlock, select};
+use forest_volume::{
+    Blending, CameraShare, Detail, Item, LEAST_THROUGH, Selection, VolumeBlock, select,
+};
 use glam::{DVec2, IVec2};
-
-/// How the billboards of two cameras make one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Blending {
-    /// Their mean by the cameras' shares; what one of them does not know is the other's alone.
-    Shares,
-    /// One over the other, each made as much more transparent as its share is smaller (paper 004,
-    /// section 2.1). Two that show the same hide less than one of them.
-    Over,
-}
 
 /// What a picture of a volume took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -143,16 +135,22 @@ impl Face<'_> {
     fn sample(&self, off: DVec2, side: u32) -> [f32; 4] {
         let half = 0.5 * f64::from(side);
         let (x, y) = (half + off.dot(self.across), half + off.dot(self.down));
-        let end = f64::from(side);
-        if !(x >= 0.0 && y >= 0.0 && x < end && y < end) {
+        // A sample on the edge that two billboards share must not fall between them by rounding.
+        let inside = -EDGE..f64::from(side) + EDGE;
+        if !(inside.contains(&x) && inside.contains(&y)) {
             return [0.0; 4];
         }
-        let [r, g, b, a] = self.texels[(y as u32 * side + x as u32) as usize];
+        // `as` makes 0 of what is below.
+        let [x, y] = [x, y].map(|v| (v as u32).min(side - 1));
+        let [r, g, b, a] = self.texels[(y * side + x) as usize];
         let alpha = f32::from(a) * (1.0 / 255.0);
         let [r, g, b] = [r, g, b].map(|c| srgb8_to_linear(c) * alpha);
         [r, g, b, alpha]
     }
 }
+
+/// How far out of a billboard, in texels, a sample still is on its edge.
+const EDGE: f64 = 1e-6;
 
 /// A cell on the picture.
 struct Billboard<'a> {
@@ -198,13 +196,10 @@ impl Layer for Billboard<'_> {
             }
         }
         if self.weight < 1.0 && color[3] > 0.0 {
-            let alpha = 1.0 - (1.0 - color[3]).max(LEAST).powf(self.weight);
+            let alpha = 1.0 - (1.0 - color[3]).max(LEAST_THROUGH).powf(self.weight);
             let scale = alpha / color[3];
             color = color.map(|c| c * scale);
         }
         color
     }
 }
-
-/// What a fading opaque texel lets through at least, before it fades: else it would not.
-const LEAST: f32 = 1.0 / 256.0;

@@ -1,11 +1,11 @@
 //! What is judged: the pack, and other ways to draw the same tree with fewer primitives.
 
-use forest_draw::{Blending, ViewsLevel, VolumeScene, point_ellipses};
+use forest_draw::{ViewsLevel, VolumeScene, point_ellipses};
 use forest_points::{Cut, PixelArea, PointsBlock, Thresholds, select_into};
 use forest_raster::{DisplayList, Ellipse, Picture, Style, Surfaces, draw, rasterize};
 use forest_soup::{Camera, TriangleSoup};
 use forest_views::Lookup;
-use forest_volume::Detail;
+use forest_volume::{Blending, Detail};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

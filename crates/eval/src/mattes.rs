@@ -1,10 +1,10 @@
 //! Volumes beside photographs that their bake did not know.
 
 use crate::error::EvalError;
-use forest_draw::{Blending, VolumeScene};
+use forest_draw::VolumeScene;
 use forest_raster::{Picture, Sampling};
 use forest_soup::{Camera, Photograph, srgb8_to_linear};
-use forest_volume::{Detail, VolumeBlock};
+use forest_volume::{Blending, Detail, VolumeBlock};
 use serde::Serialize;
 
 /// Differences of drawn pictures from photographs: means over the photographs.

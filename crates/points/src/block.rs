@@ -3,6 +3,7 @@
 use crate::calibration::Calibration;
 use crate::header::{CellRecord, PointsHeader};
 use crate::record::PointRecord;
+use crate::size::SizeCode;
 use crate::triangle::TriangleRecord;
 use forest_pack::kind;
 use forest_pack::measures::{ErrorKind, Light, Need};
@@ -42,6 +43,12 @@ impl<'a> PointsBlock<'a> {
         self.origin() + block * self.scale()
     }
 
+    /// World position of the middle of the source's box.
+    pub fn middle(&self) -> DVec3 {
+        let [min, max] = [self.header.min, self.header.max].map(DVec3::from_array);
+        self.to_world((min + max) * 0.5)
+    }
+
     /// Half the diagonal of the source's box, in world units: the paper's block size R.
     pub fn half_diagonal(&self) -> f64 {
         let size = DVec3::from_array(self.header.max) - DVec3::from_array(self.header.min);
@@ -52,7 +59,7 @@ impl<'a> PointsBlock<'a> {
     /// pixels and the camera's elevation, both at the block's middle, under base colours.
     pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
         let [min, max] = [self.header.min, self.header.max].map(DVec3::from_array);
-        let middle = self.to_world((min + max) * 0.5);
+        let middle = self.middle();
         let distance = (middle - camera.eye).dot(camera.forward).max(f64::MIN_POSITIVE);
         let height = (max - min).max_element() * self.scale() * camera.pixels_per_unit(distance);
         Need {
@@ -73,11 +80,21 @@ impl<'a> PointsBlock<'a> {
         }))
     }
 
+    /// Block units of a position step of a cell.
+    pub fn step(&self, cell: &CellRecord) -> f64 {
+        f64::from(self.header.step_exponent + cell.step_shift as i32).exp2()
+    }
+
     /// Radius of a point as it is drawn, in block units.
     #[inline]
     pub fn radius(&self, point: &PointRecord) -> f64 {
-        let own = point.own();
-        self.calibration.as_ref().map_or(1.0, |c| c.radius_factor(own)) * own.radius()
+        self.radius_of(point.own())
+    }
+
+    /// Radius of points of size `code` as they are drawn, in block units.
+    #[inline]
+    pub fn radius_of(&self, code: SizeCode) -> f64 {
+        self.calibration.as_ref().map_or(1.0, |c| c.radius_factor(code)) * code.radius()
     }
 
     /// The points of a cell.

@@ -183,6 +183,9 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
                 (fine, paper_range(block, cell, fine, coarse))
             }
         };
+        // Triangles only: no point need be looked at.
+        let points =
+            if fine < 0 && coarse < 0 { cell.first_point..cell.first_point } else { points };
         let triangles = block.cell_triangles(cell);
         let drawn = triangles.partition_point(|t| i32::from(t.size) > coarse) as u32;
         let triangles = cell.first_triangle..cell.first_triangle + drawn;

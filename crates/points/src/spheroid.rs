@@ -88,7 +88,7 @@ pub struct Footprint {
 }
 
 /// A disc seen edge-on still has this ratio: dividing by it must not overflow.
-const THINNEST: f64 = 1e-6;
+pub const THINNEST: f64 = 1e-6;
 
 impl Footprint {
     /// Of a spheroid of quantised flatness `step` about unit vector `axis`, seen from unit direction

@@ -9,7 +9,7 @@ use crate::list::{DisplayList, Ellipse, Fragment, Triangle};
 use crate::opacity::covers;
 use crate::picture::{Picture, PixelMean};
 use crate::sampling::{Pattern, Sampling};
-use crate::sprite::Sprite;
+use crate::sprite::{Sprite, SpriteHit};
 use forest_soup::{Camera, Projection};
 use glam::{IVec2, Vec3};
 use rayon::prelude::*;
@@ -235,13 +235,21 @@ impl Canvas<'_> {
         match self.list.thing(i) {
             Thing::Triangle(t) => t.shade(x, y),
             // An ellipse comes lit.
-            Thing::Ellipse(e) => Fragment { rgb: e.rgb, normal: e.normal, unlit: true, sky: 1.0 },
+            Thing::Ellipse(e) => {
+                Fragment { rgb: e.rgb, normal: e.normal, unlit: true, sunlit: 1.0, sky: 1.0 }
+            }
             Thing::Sprite(s) => match s.sample(x, y, grid) {
-                Some(hit) => {
-                    Fragment { rgb: hit.rgb, normal: hit.normal, unlit: false, sky: hit.sky }
+                Some(SpriteHit { rgb, normal, sunlit, sky, .. }) => {
+                    Fragment { rgb, normal, unlit: false, sunlit, sky }
                 }
                 // The same answer as before: it was a hit.
-                None => Fragment { rgb: [0.0; 3], normal: Vec3::ZERO, unlit: true, sky: 1.0 },
+                None => Fragment {
+                    rgb: [0.0; 3],
+                    normal: Vec3::ZERO,
+                    unlit: true,
+                    sunlit: 1.0,
+                    sky: 1.0,
+                },
             },
         }
     }
@@ -252,7 +260,7 @@ impl Fragment {
         if self.unlit {
             return self.rgb;
         }
-        let factors = light.under_sky(self.normal, self.sky);
+        let factors = light.factors(self.normal, self.sunlit, self.sky);
         std::array::from_fn(|k| self.rgb[k] * factors[k])
     }
 }

@@ -27,6 +27,9 @@ pub struct Sun {
     pub sky: [f32; 3],
     /// Share of the sunlight on the far side that shines through, in `0..=1`.
     pub translucency: f32,
+    /// Estimated self-shadow of blocks of points: share of the sun at the side that is farthest from
+    /// it, in `0..=1`; 1 for none. See [`Sun::seen`].
+    pub darkest: f32,
 }
 
 impl Light {
@@ -36,24 +39,45 @@ impl Light {
         sun: [0.55; 3],
         sky: [0.45; 3],
         translucency: 1.0,
+        darkest: 1.0,
     });
 
     /// Factors on the base colour of a surface whose unit normal `normal` faces the eye, without
     /// shadows.
     pub fn unshadowed(&self, normal: Vec3) -> [f32; 3] {
-        self.under_sky(normal, 1.0)
+        self.factors(normal, 1.0, 1.0)
     }
 
-    /// The same where only a share `skylit` of the sky is seen.
-    pub fn under_sky(&self, normal: Vec3, skylit: f32) -> [f32; 3] {
+    /// [`Sun::seen`]; 1 without a sun.
+    pub fn seen(&self, off: DVec3, half_diagonal: f64) -> f32 {
+        match self {
+            Light::Albedo => 1.0,
+            Light::Sun(sun) => sun.seen(off, half_diagonal),
+        }
+    }
+
+    /// Factors on a base colour where only a share `sunlit` of the sun and `skylit` of the sky is seen.
+    pub fn factors(&self, normal: Vec3, sunlit: f32, skylit: f32) -> [f32; 3] {
         match self {
             Light::Albedo => [1.0; 3],
-            Light::Sun(sun) => sun.factors(normal, 1.0, skylit),
+            Light::Sun(sun) => sun.factors(normal, sunlit, skylit),
         }
     }
 }
 
 impl Sun {
+    /// Share of the sun that is estimated to be seen `off` from the middle of a block of this half
+    /// diagonal (Gilet, Meyer, Neyret 2005, section 5.3: L_M = 1, L_m = [`Sun::darkest`]).
+    ///
+    /// As printed, L = L_M + (Z − 1)/2·(L_M − L_m) with their Z (−1 at the front, 1 at the back)
+    /// darkens the side nearest to the light. Here Z is measured along the light, −1 where it comes
+    /// in, and L = L_M − (Z + 1)/2·(L_M − L_m); it weighs the sunlight, the sky is not shadowed.
+    pub fn seen(&self, off: DVec3, half_diagonal: f64) -> f32 {
+        let half = half_diagonal.max(f64::MIN_POSITIVE);
+        let z = (-off.dot(self.to_sun) / half).clamp(-1.0, 1.0) as f32;
+        1.0 - 0.5 * (z + 1.0) * (1.0 - self.darkest)
+    }
+
     /// Factors on the base colour where `sunlit` of the sun and `skylit` of the sky is seen.
     pub(crate) fn factors(&self, normal: Vec3, sunlit: f32, skylit: f32) -> [f32; 3] {
         let cos = normal.dot(self.to_sun.as_vec3());
@@ -68,10 +92,29 @@ mod tests {
 
     #[test]
     fn the_far_side_gets_what_shines_through() {
-        let sun = Sun { to_sun: DVec3::Y, sun: [2.0; 3], sky: [0.5; 3], translucency: 0.25 };
+        let sun = Sun {
+            to_sun: DVec3::Y,
+            sun: [2.0; 3],
+            sky: [0.5; 3],
+            translucency: 0.25,
+            darkest: 1.0,
+        };
         assert_eq!(Light::Sun(sun).unshadowed(Vec3::Y), [2.5; 3]);
         assert_eq!(Light::Sun(sun).unshadowed(Vec3::NEG_Y), [1.0; 3]);
         assert_eq!(sun.factors(Vec3::Y, 0.0, 0.5), [0.25; 3]);
         assert_eq!(Light::Albedo.unshadowed(Vec3::X), [1.0; 3]);
+    }
+
+    #[test]
+    fn the_side_away_from_the_sun_is_darkest() {
+        let sun =
+            Sun { to_sun: DVec3::Y, sun: [2.0; 3], sky: [0.5; 3], translucency: 0.0, darkest: 0.2 };
+        let seen = |y: f64| sun.seen(DVec3::new(7.0, y, -3.0), 2.0);
+        for (y, want) in [(2.0, 1.0), (0.0, 0.6), (-2.0, 0.2), (-9.0, 0.2)] {
+            assert!((seen(y) - want).abs() < 1e-6, "{y}: {}", seen(y));
+        }
+        assert_eq!(Light::Albedo.seen(DVec3::Y, 1.0), 1.0);
+        // A block without extent.
+        assert!(Light::Sun(sun).seen(DVec3::ZERO, 0.0).is_finite());
     }
 }

@@ -18,6 +18,8 @@ pub struct Corner {
     pub uv: Vec2,
     /// Linear RGBA that multiplies the material.
     pub color: [f32; 4],
+    /// Share of the sun that is estimated to be seen ([`crate::Sun::seen`]); 1 for all.
+    pub sunlit: f32,
 }
 
 /// An ellipse in the picture plane, all at one depth: a point of a LOD, or a particle.
@@ -72,6 +74,7 @@ pub(crate) struct Triangle<'a> {
     colors: Option<Box<[[f32; 4]; 3]>>,
     /// Towards the eye.
     normals: [Vec3; 3],
+    sunlit: [f32; 3],
     pub(crate) surface: &'a Surface,
 }
 
@@ -132,6 +135,7 @@ impl Corner {
             normal: self.normal.lerp(other.normal, f),
             uv: self.uv.lerp(other.uv, f),
             color: std::array::from_fn(|k| self.color[k] + (other.color[k] - self.color[k]) * f),
+            sunlit: self.sunlit + (other.sunlit - self.sunlit) * f,
         }
     }
 }
@@ -198,6 +202,8 @@ pub(crate) struct Fragment {
     /// Towards the eye.
     pub(crate) normal: Vec3,
     pub(crate) unlit: bool,
+    /// Share of the sun that is seen from there.
+    pub(crate) sunlit: f32,
     /// Share of the sky that is seen from there.
     pub(crate) sky: f32,
 }
@@ -243,6 +249,7 @@ impl<'a> Triangle<'a> {
             uvs: corners.map(|c| c.uv),
             colors: (!plain).then(|| Box::new(corners.map(|c| c.color))),
             normals,
+            sunlit: corners.map(|c| c.sunlit),
             surface,
         })
     }
@@ -282,6 +289,7 @@ impl<'a> Triangle<'a> {
             rgb: self.surface.at(self.uv(w), self.tint(w)).0,
             normal: (a * w[0] + b * w[1] + c * w[2]).normalize_or_zero(),
             unlit: self.surface.is_unlit(),
+            sunlit: self.sunlit[0] * w[0] + self.sunlit[1] * w[1] + self.sunlit[2] * w[2],
             sky: 1.0,
         }
     }

@@ -58,6 +58,7 @@ pub(crate) fn corners(soup: &TriangleSoup, i: usize) -> [Corner; 3] {
             normal: soup.normals.get(v).copied().unwrap_or(Vec3::ZERO),
             uv: soup.uvs.get(v).copied().unwrap_or(Vec2::ZERO),
             color: soup.colors.get(v).copied().unwrap_or([1.0; 4]),
+            sunlit: 1.0,
         }
     })
 }

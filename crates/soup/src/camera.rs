@@ -48,6 +48,38 @@ impl Camera {
         Self { eye, right, up, forward, projection, width: size[0], height: size[1] }
     }
 
+    /// A camera that shows the box from `min` to `max` as large as it can be. It stands at `angles`, yaw
+    /// and pitch in degrees: 0, 0 is before the box (+Z), yaw 90 to its right (+X), pitch 90 above it.
+    /// It is parallel, or at `distance` half diagonals of the box from its middle.
+    pub fn around(
+        [min, max]: [DVec3; 2],
+        [yaw, pitch]: [f64; 2],
+        distance: Option<f64>,
+        size: [u32; 2],
+    ) -> Self {
+        let (yaw, pitch) = (yaw.to_radians(), pitch.to_radians());
+        let from = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos());
+        let (center, radius) = ((min + max) * 0.5, (max - min).length() * 0.5);
+        // Down to the shorter side of the picture.
+        let aspect = f64::from(size[0]) / f64::from(size[1].max(1));
+        let Some(distance) = distance else {
+            let unit = Projection::Orthographic { height: 1.0 };
+            let [across, down] = Self::new(DVec3::ZERO, -from, unit, size).extent(max - min);
+            let height = 1.04 * down.max(across / aspect).max(1e-9 * radius);
+            let eye = center + from * (2.0 * radius);
+            return Self::new(eye, -from, Projection::Orthographic { height }, size);
+        };
+        let fov = if distance > 1.05 { 2.0 * (1.0 / distance).asin() } else { 1.2 };
+        let fov_y = if aspect < 1.0 { 2.0 * ((0.5 * fov).tan() / aspect).atan() } else { fov };
+        let eye = center + from * (distance * radius);
+        Self::new(eye, -from, Projection::Perspective { fov_y }, size)
+    }
+
+    /// Width and height of a parallel picture of a box of this size.
+    fn extent(&self, size: DVec3) -> [f64; 2] {
+        [self.right, self.up].map(|axis| axis.abs().dot(size))
+    }
+
     /// Pixels that one world unit covers at distance `distance` from the eye (any distance for an
     /// orthographic camera).
     pub fn pixels_per_unit(&self, distance: f64) -> f64 {
@@ -82,6 +114,24 @@ impl Camera {
     }
 }
 
+/// Yaw and pitch in degrees of a view by its name (front, right, back, left, top, diagonal) or as
+/// "YAW,PITCH"; `None` for any other text.
+pub fn named_view(text: &str) -> Option<[f64; 2]> {
+    Some(match text {
+        "front" => [0.0, 0.0],
+        "right" => [90.0, 0.0],
+        "back" => [180.0, 0.0],
+        "left" => [-90.0, 0.0],
+        "top" => [0.0, 90.0],
+        "diagonal" => [45.0, 30.0],
+        _ => {
+            let (yaw, pitch) = text.split_once(',')?;
+            let angles = [yaw.trim().parse().ok()?, pitch.trim().parse().ok()?];
+            return angles.iter().all(|v: &f64| v.is_finite()).then_some(angles);
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,5 +157,27 @@ mod tests {
             let c = Camera::new(DVec3::ZERO, f, Projection::Orthographic { height: 1.0 }, [1, 1]);
             assert!((c.up.cross(c.right) - c.forward).length() < 1e-12, "{f}");
         }
+    }
+
+    #[test]
+    fn cameras_around_a_box_show_all_of_it() {
+        let bounds = [DVec3::new(-1.0, 0.0, -2.0), DVec3::new(1.0, 5.0, 2.0)];
+        for size in [[100, 100], [300, 100], [100, 300]] {
+            for (view, distance) in [("front", None), ("30,20", None), ("top", Some(3.0))] {
+                let c = Camera::around(bounds, named_view(view).unwrap(), distance, size);
+                let corner = |i: usize| DVec3::from_array([0, 1, 2].map(|k| bounds[i >> k & 1][k]));
+                let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+                for (x, y, _) in (0..8).map(|i| c.project(corner(i))) {
+                    (low, high) =
+                        ([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]);
+                }
+                let share = [0, 1].map(|k| (high[k] - low[k]) / f64::from(size[k]));
+                assert!(share.iter().all(|s| *s < 1.0), "{view} {size:?}: {share:?}");
+                // A parallel picture is filled; one in perspective holds the ball around the box.
+                let least = if distance.is_none() { 0.95 } else { 0.3 };
+                assert!(share[0].max(share[1]) > least, "{view} {size:?}: {share:?}");
+            }
+        }
+        assert_eq!(named_view("1,2,3").or(named_view("1")).or(named_view("nan,0")), None);
     }
 }

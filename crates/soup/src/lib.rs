@@ -39,7 +39,7 @@ mod shaded;
 mod soup;
 mod texture;
 
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Projection, named_view};
 pub use color::{linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
 pub use coverage::CoverageMap;
 pub use material::{AlphaMode, Material};

@@ -7,6 +7,7 @@ use crate::header::{TileRecord, ViewFrame, ViewsHeader};
 use crate::validate::validate;
 use forest_pack::{Codec, Pack, PackError, SectionId, header, kind};
 use glam::DVec3;
+use std::borrow::Cow;
 
 /// The views representation of a pack; texels stay in the memory map until they are decoded.
 #[derive(Clone, Debug)]
@@ -74,6 +75,12 @@ impl<'a> ViewsBlock<'a> {
         DVec3::from_array(self.header.center)
     }
 
+    /// Half the diagonal of the source's box, in world units.
+    pub fn half_diagonal(&self) -> f64 {
+        let [min, max] = self.header.bounds.map(DVec3::from_array);
+        0.5 * min.distance(max)
+    }
+
     /// Stored bytes of a channel of a level; 0 if it is not stored.
     pub fn channel_bytes(&self, channel: Channel, level: usize) -> u64 {
         if !self.header.channels.has(channel) {
@@ -82,17 +89,26 @@ impl<'a> ViewsBlock<'a> {
         channel.level_bytes(self.header.quality, &self.header.levels[level])
     }
 
+    /// A channel of `level` as it is stored: pages one under the other, in the blocks that graphics
+    /// devices read (BC7 colour, BC5 normals, BC4 depth and sky) or plain; empty if it is not stored.
+    ///
+    /// # Errors
+    /// When the section is damaged.
+    pub fn stored(&self, channel: Channel, level: usize) -> Result<Cow<'a, [u8]>, PackError> {
+        if !self.header.channels.has(channel) {
+            return Ok(Cow::Borrowed(&[]));
+        }
+        let id = SectionId::new(section_kind(channel), level as u32);
+        self.pack.bytes(id, self.channel_bytes(channel, level))
+    }
+
     /// Reads and decodes what a renderer needs of `level`.
     ///
     /// # Errors
     /// When a section is damaged.
     pub fn texels(&self, level: usize) -> Result<Texels, PackError> {
         let read = |channel: Channel| -> Result<Vec<u8>, PackError> {
-            if !self.header.channels.has(channel) {
-                return Ok(Vec::new());
-            }
-            let id = SectionId::new(section_kind(channel), level as u32);
-            let stored = self.pack.bytes(id, self.channel_bytes(channel, level))?;
+            let stored = self.stored(channel, level)?;
             let width = self.header.levels[level].page[0];
             Ok(decode(channel, self.header.quality, width, &stored))
         };
@@ -154,5 +170,9 @@ pub fn decode_normal(stored: [u8; 2], frame: &ViewFrame) -> DVec3 {
 /// Height towards the camera above the plane through the centre of a stored depth, in radii of
 /// [`ViewsHeader::radius`]: 1 … −1.
 pub fn decode_height(stored: u16) -> f64 {
-    1.0 - 2.0 * f64::from(stored) / 65535.0
+    1.0 - 2.0 * (f64::from(stored) + OFF_STEPS) / 65535.0
 }
+
+/// Share of a step that stored depths lie behind their number: compressed ones are multiples of 1/255,
+/// and would often lie exactly on the steps of a ray, where each renderer's rounding decides.
+pub const OFF_STEPS: f64 = 0.3;

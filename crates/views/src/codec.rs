@@ -102,11 +102,13 @@ pub fn decode(channel: Channel, quality: Quality, width: u32, stored: &[u8]) -> 
                 Channel::Normal => bcdec_rs::bc5(block, &mut rows[i * 8..], row, false),
                 Channel::Sky => bcdec_rs::bc4(block, &mut rows[i * 4..], row, false),
                 Channel::Depth => {
-                    let mut eight = [0; 16];
-                    bcdec_rs::bc4(block, &mut eight, 4, false);
-                    for (k, d) in eight.into_iter().enumerate() {
+                    // Between the two ends of a block depth is finer than 8 bits.
+                    let mut fine = [0.0; 16];
+                    bcdec_rs::bc4_float(block, &mut fine, 4, false);
+                    for (k, d) in fine.into_iter().enumerate() {
                         let at = (k / 4) * row + (i * 4 + k % 4) * 2;
-                        rows[at..at + 2].copy_from_slice(&(u16::from(d) * 257).to_le_bytes());
+                        let d = (d * 65535.0).round() as u16;
+                        rows[at..at + 2].copy_from_slice(&d.to_le_bytes());
                     }
                 }
             }

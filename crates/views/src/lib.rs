@@ -63,12 +63,12 @@ mod tile;
 mod validate;
 
 pub use bake::{BakeReport, TexelCounts, bake};
-pub use block::{Texels, ViewsBlock, decode_height, decode_normal, normal_parts};
+pub use block::{OFF_STEPS, Texels, ViewsBlock, decode_height, decode_normal, normal_parts};
 pub use codec::{Channel, decode, encode};
 pub use directions::{Blend, Directions, Dome, Layout, MAX_VIEWS};
 pub use error::ViewsError;
 pub use fit::Frame;
 pub use header::{LevelHeader, TileRecord, ViewFrame, ViewsHeader};
-pub use lookup::{Found, Hit, Ray, ViewSampler};
+pub use lookup::{BEHIND, Found, Hit, JOINED, MOST_STEPS, Ray, SLACK, ViewSampler};
 pub use options::{Channels, Fit, Quality, ViewsOptions};
-pub use select::{Lookup, Selection, select, views};
+pub use select::{COVER, Lookup, PICK, Selection, select, views};

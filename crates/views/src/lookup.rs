@@ -57,13 +57,17 @@ pub struct ViewSampler<'a> {
 
 /// How far before what a view sees another view's hit still counts as behind it, in texels: a
 /// texel's depth is the mean of what it shows.
-const SLACK: f64 = 16.0;
+pub const SLACK: f64 = 16.0;
 
 /// Neighbouring texels whose depths differ by at most this many texels show one surface.
-const JOINED: f64 = 4.0;
+pub const JOINED: f64 = 4.0;
 
 /// Most texels that a ray is followed through.
-const MOST_STEPS: f64 = 256.0;
+pub const MOST_STEPS: f64 = 256.0;
+
+/// Cosine of a ray with the direction towards a view's camera above which, more than 85° off, the view
+/// can say nothing. (A parallel camera that looks straight up from below an upper dome sees nothing.)
+pub const BEHIND: f64 = -0.087;
 
 impl<'a> ViewSampler<'a> {
     /// View `view` of `block` at `level`, whose decoded texels are `texels`.
@@ -99,7 +103,11 @@ impl<'a> ViewSampler<'a> {
         let mut hidden = false;
         // The surface that the ray was before in the texel before this one.
         let mut ahead: Option<f64> = None;
-        for n in 0..steps as u32 {
+        // Where nothing is stored nothing is met.
+        let [top, bottom] = path.heights_within(self.tile);
+        let first = ((self.reach - top) / -stride - 1.0).max(0.0) as u32;
+        let end = ((self.reach - bottom) / -stride + 1.0).clamp(0.0, steps) as u32;
+        for n in first..end {
             let near = self.reach + stride * f64::from(n);
             let far = near + stride;
             if path.distance(far) < ray.from {
@@ -205,9 +213,7 @@ impl Path {
     fn new(view: &ViewSampler, ray: &Ray) -> Option<Self> {
         let ViewFrame { right, up, back } = *view.frame;
         let slope = ray.direction.dot(back);
-        // More than 85° off: no view can say anything. (A parallel camera that looks straight up
-        // from below an upper dome sees nothing.)
-        if slope > -0.087 {
+        if slope > BEHIND {
             return None;
         }
         let (h, dh) = (ray.origin.dot(back), 1.0 / slope);
@@ -217,6 +223,28 @@ impl Path {
         let gain = [ray.direction.dot(right) * dh * scale, -ray.direction.dot(up) * dh * scale];
         let speed = gain[0].hypot(gain[1]);
         Some(Self { start, gain, speed, distance: [-h * dh, dh] })
+    }
+
+    /// The heights between which the ray is before the stored part of a tile: from the higher to the
+    /// lower one.
+    fn heights_within(&self, tile: &TileRecord) -> [f64; 2] {
+        let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
+        let ends = [(tile.left, tile.width), (tile.top, tile.height)];
+        for (k, (from, size)) in ends.into_iter().enumerate() {
+            let [a, b] = [f64::from(from), f64::from(from) + f64::from(size)]
+                .map(|edge| (edge - self.start[k]) / self.gain[k]);
+            // A ray that does not move along this axis is within for all heights, or for none.
+            if self.gain[k] == 0.0 {
+                let inside =
+                    (f64::from(from)..f64::from(from) + f64::from(size)).contains(&self.start[k]);
+                if !inside {
+                    return [f64::NEG_INFINITY, f64::INFINITY];
+                }
+                continue;
+            }
+            (top, bottom) = (top.min(a.max(b)), bottom.max(a.min(b)));
+        }
+        [top, bottom]
     }
 
     fn texel(&self, height: f64) -> [f64; 2] {

@@ -1,11 +1,18 @@
 //! What to draw for a camera: which level, which views, and the square that shows them.
 
 use crate::block::ViewsBlock;
+use crate::codec::Channel;
 use crate::directions::Blend;
 use forest_pack::kind;
 use forest_pack::measures::{ErrorKind, Light, Need};
-use forest_soup::Camera;
+use forest_soup::{Camera, Projection};
+use glam::{DVec3, IVec2};
 use serde::{Deserialize, Serialize};
+
+/// Numbers for the hash rule: which view shows a sample.
+pub const PICK: u32 = 0x7669_6577;
+/// Whether its texel covers it.
+pub const COVER: u32 = 0x636f_7672;
 
 /// How a picture is made of views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -63,6 +70,27 @@ pub fn views(block: &ViewsBlock, camera: &Camera, lookup: Lookup) -> Blend {
 }
 
 impl ViewsBlock<'_> {
+    /// Stored bytes of a view's tile in the channels that `lookup` reads; base colours need no light.
+    pub fn tile_bytes(&self, level: usize, view: u32, lookup: Lookup) -> u64 {
+        let reads = |c: &Channel| {
+            matches!((c, lookup), (Channel::Color, _) | (Channel::Depth, Lookup::Depth))
+        };
+        let block: u64 = Channel::ALL
+            .into_iter()
+            .filter(|c| self.header.channels.has(*c) && reads(c))
+            .map(|c| c.block_bytes(self.header.quality))
+            .sum();
+        let t = &self.tiles[level][view as usize];
+        u64::from(t.width / 4) * u64::from(t.height / 4) * block
+    }
+
+    /// First and last pixel of the box around all that `level` shows to `camera`: around the ball that
+    /// holds the source, and the texels at its edge, which are blurred by their width.
+    pub fn pixels(&self, camera: &Camera, level: usize) -> (IVec2, IVec2) {
+        let texel = 2.0 * self.header.half / f64::from(self.header.levels[level].texels);
+        ball_pixels(camera, self.center(), self.header.radius + 2.0 * texel)
+    }
+
     /// What a pack's measured table is to be asked for this block before `camera`, under base
     /// colours.
     pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
@@ -77,5 +105,34 @@ impl ViewsBlock<'_> {
             light: Light::Albedo,
             error,
         }
+    }
+}
+
+/// First and last pixel of the box around a ball's picture.
+fn ball_pixels(camera: &Camera, center: DVec3, radius: f64) -> (IVec2, IVec2) {
+    let to = center - camera.eye;
+    let (depth, aside) = (to.dot(camera.forward), [to.dot(camera.right), -to.dot(camera.up)]);
+    let middle = [camera.width, camera.height].map(|n| f64::from(n) * 0.5);
+    let scale = camera.pixels_per_unit(1.0);
+    let ends = |k: usize| match camera.projection {
+        Projection::Orthographic { .. } => {
+            Some([aside[k] - radius, aside[k] + radius].map(|v| middle[k] + v * scale))
+        }
+        // The angles of the two tangents in the plane of this axis.
+        Projection::Perspective { .. } => {
+            let (angle, distance) = (aside[k].atan2(depth), aside[k].hypot(depth));
+            let half = (radius / distance).min(1.0).asin();
+            let seen = distance > radius && angle.abs() + half < std::f64::consts::FRAC_PI_2;
+            seen.then(|| [angle - half, angle + half].map(|a| middle[k] + a.tan() * scale))
+        }
+    };
+    match (ends(0), ends(1)) {
+        (Some(x), Some(y)) => {
+            let pixel = |i: usize| IVec2::new(x[i].floor() as i32, y[i].floor() as i32);
+            (pixel(0), pixel(1))
+        }
+        // Around the eye, or reaching behind it: anywhere.
+        _ if depth > -radius => (IVec2::MIN, IVec2::MAX),
+        _ => (IVec2::ONE, IVec2::ZERO),
     }
 }

@@ -4,8 +4,11 @@ use crate::atlas::Codewords;
 use crate::header::{Coding, NodeRecord, VolumeHeader};
 use crate::lattice::Lattice;
 use crate::validate::{StoredLevel, validate, validate_header};
+use forest_pack::measures::{ErrorKind, Light, Need};
 use forest_pack::{Codec, Pack, PackError, SectionId, header, kind};
+use forest_soup::Camera;
 use forest_vq::{bits_for, read_bits};
+use glam::DVec3;
 
 /// The volume representation of a pack; billboards stay in the memory map until they are decoded.
 #[derive(Clone, Debug)]
@@ -76,6 +79,21 @@ impl<'a> VolumeBlock<'a> {
         Some(self.nodes[level][node as usize].first_billboard + before + here)
     }
 
+    /// What a pack's measured table is to be asked for this volume before `camera`.
+    pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
+        let [low, high] = self.header.bounds.map(DVec3::from_array);
+        let middle = 0.5 * (low + high);
+        let distance = (middle - camera.eye).dot(camera.forward).max(f64::MIN_POSITIVE);
+        let height = (high - low).max_element() * camera.pixels_per_unit(distance);
+        Need {
+            representation: kind::VOLUME_HEADER,
+            pixel_height: height as f32,
+            elevation: Some(camera.to_eye(middle).y.clamp(-1.0, 1.0).asin().to_degrees() as f32),
+            light: Light::Albedo,
+            error,
+        }
+    }
+
     /// Stored bytes of one billboard, without its share of the atlas.
     pub fn billboard_bytes(&self) -> f64 {
         f64::from(self.header.coding.billboard_bits(self.header.billboard_texels())) / 8.0
@@ -111,6 +129,43 @@ impl<'a> VolumeBlock<'a> {
                 Ok(colors.iter().zip(&alphas).flat_map(billboard).collect())
             })
             .collect()
+    }
+
+    /// The raw texels of a level, sRGB and alpha, where they lie; empty if there are codes instead.
+    ///
+    /// # Errors
+    /// When the section is damaged.
+    pub fn stored_texels(&self, level: u32) -> Result<&'a [u8], PackError> {
+        match self.header.coding {
+            Coding::Texels => self.stored(kind::VOLUME_TEXELS, level),
+            Coding::Codebook { .. } => Ok(&[]),
+        }
+    }
+
+    /// The packed colour and alpha codes of a level where they lie ([`forest_vq::read_bits`]), each
+    /// checked to be of a codeword; empty if there are raw texels instead.
+    ///
+    /// # Errors
+    /// When a section is damaged, or a number of a codeword is too large.
+    pub fn stored_codes(&self, level: u32) -> Result<[&'a [u8]; 2], PackError> {
+        let Coding::Codebook { colors, alphas, .. } = self.header.coding else {
+            return Ok([&[], &[]]);
+        };
+        let count = self.header.levels[level as usize].billboards;
+        self.numbers(kind::VOLUME_COLORS, level, count, colors)?;
+        self.numbers(kind::VOLUME_ALPHAS, level, count, alphas)?;
+        Ok([self.stored(kind::VOLUME_COLORS, level)?, self.stored(kind::VOLUME_ALPHAS, level)?])
+    }
+
+    /// The atlas of codewords where it lies; empty without one.
+    ///
+    /// # Errors
+    /// When the section is damaged.
+    pub fn stored_atlas(&self) -> Result<&'a [u8], PackError> {
+        match self.header.coding {
+            Coding::Texels => Ok(&[]),
+            Coding::Codebook { .. } => self.stored(kind::VOLUME_ATLAS, 0),
+        }
     }
 
     /// Numbers of codewords of a level, each below `words`.

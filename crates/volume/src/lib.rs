@@ -72,13 +72,15 @@ pub use atlas::Codewords;
 pub use bake::{BakeReport, bake};
 pub use block::VolumeBlock;
 pub use error::VolumeError;
-pub use forest_vq::Centers;
+pub use forest_vq::{Centers, bits_for as code_bits};
 pub use frame::CameraFrame;
 pub use header::{ATLAS_WIDTH, Coding, LevelHeader, NodeRecord, VolumeHeader};
 pub use lattice::{Branching, Lattice};
 pub use options::{Blank, Coarse, CodebookOptions, CodebookSize, Prune, Space, VolumeOptions};
 pub use photograph::Stand;
 pub use quantise::{Effort, Quality, Quantised, quantise};
-pub use select::{CameraShare, Detail, Item, Selection, planes, select};
+pub use select::{
+    Blending, CameraShare, Detail, Item, LEAST_THROUGH, Selection, planes, select, select_into,
+};
 pub use tomography::{TomographyOptions, TomographyReport};
 pub use volume::{LevelCounts, Volume, VolumeLevel, VolumeReport};

@@ -29,6 +29,16 @@ impl Detail {
     pub const FADE: f64 = 0.1;
 }
 
+/// How the billboards of two cameras make one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Blending {
+    /// Their mean by the cameras' shares; what one of them does not know is the other's alone.
+    Shares,
+    /// One over the other, each made as much more transparent as its share is smaller (paper 004,
+    /// section 2.1). Two that show the same hide less than one of them.
+    Over,
+}
+
 /// A camera whose billboards are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraShare {
@@ -54,6 +64,9 @@ pub struct Item {
     pub weight: f32,
 }
 
+/// What a fading opaque texel lets through at least, before it fades: else it would not.
+pub const LEAST_THROUGH: f32 = 1.0 / 256.0;
+
 /// What to draw.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
@@ -68,6 +81,20 @@ pub struct Selection {
 /// four of their sides to a perspective eye, which fade, and what is behind it. The order is exact for
 /// every camera, also within the volume: no cell hides one that is drawn after it.
 pub fn select(block: &VolumeBlock, camera: &Camera, detail: Detail) -> Selection {
+    let mut selection = Selection::default();
+    select_into(block, camera, detail, &mut selection);
+    selection
+}
+
+/// As [`select`], into a selection that is kept from frame to frame: its items are allocated once.
+pub fn select_into(
+    block: &VolumeBlock,
+    camera: &Camera,
+    detail: Detail,
+    selection: &mut Selection,
+) {
+    let mut items = std::mem::take(&mut selection.items);
+    items.clear();
     let mut walk = Walk {
         block,
         camera,
@@ -76,10 +103,10 @@ pub fn select(block: &VolumeBlock, camera: &Camera, detail: Detail) -> Selection
             Detail::Planes { fade, .. } => fade.clamp(0.0, 1.0),
             Detail::Level(_) => 0.0,
         },
-        items: Vec::new(),
+        items,
     };
     walk.node(0, 0, 1.0);
-    Selection { cameras: nearest_cameras(block, camera), items: walk.items }
+    *selection = Selection { cameras: nearest_cameras(block, camera), items: walk.items };
 }
 
 /// For each level the distance along the camera's axis from which its texels are fine enough;

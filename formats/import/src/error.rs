@@ -35,6 +35,16 @@ pub enum ImportError {
 }
 
 impl ImportError {
+    /// The code that programs exit with: 2 for input and output, 5 for what is not supported, 3 for
+    /// what is invalid.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { .. } => 2,
+            Self::Unsupported { .. } => 5,
+            _ => 3,
+        }
+    }
+
     pub(crate) fn invalid(file: &Path, element: impl ToString, problem: impl ToString) -> Self {
         Self::Invalid {
             file: file.into(),

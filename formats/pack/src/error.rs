@@ -40,6 +40,16 @@ pub enum PackError {
 }
 
 impl PackError {
+    /// The code that programs exit with: 2 for input and output, 5 for what is not supported, 3 for
+    /// what is invalid.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { .. } => 2,
+            Self::Unsupported { .. } => 5,
+            _ => 3,
+        }
+    }
+
     /// An [`PackError::Invalid`], for owners of sections.
     pub fn invalid(file: &Path, element: impl ToString, problem: impl ToString) -> Self {
         Self::Invalid {

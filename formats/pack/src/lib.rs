@@ -27,6 +27,7 @@ mod layout;
 pub mod measures;
 mod reader;
 mod spool;
+mod whole;
 mod writer;
 
 pub use error::PackError;
@@ -34,4 +35,5 @@ pub use kind::SectionId;
 pub use layout::{ALIGNMENT, Codec, VERSION};
 pub use reader::{Pack, Section};
 pub use spool::Spool;
+pub use whole::write_whole;
 pub use writer::{Compressed, PackWriter};

@@ -166,7 +166,7 @@ impl Measures {
     /// met, and of the measured heights next below and above, for the level that means the same cut
     /// in square pixels. What was not measured in all of them is left out. Beyond the measured
     /// heights and elevations the nearest count, and the choice says so.
-    fn choices(&self, need: &Need) -> Vec<Choice> {
+    pub fn choices(&self, need: &Need) -> Vec<Choice> {
         let asked = |r: &&Measure| r.representation == need.representation && r.light == need.light;
         let rows: Vec<&Measure> = self.rows.iter().filter(asked).collect();
         let (low, high) = range(rows.iter().flat_map(|r| r.elevation));

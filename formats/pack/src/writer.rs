@@ -4,7 +4,7 @@ use crate::layout::{
     ALIGNMENT, Codec, ENTRY_HASH, FileHeader, MAGIC, MAX_SECTIONS, TableEntry, VERSION,
     section_hash, table_hash,
 };
-use crate::{Pack, PackError, SectionId, Spool};
+use crate::{Pack, PackError, SectionId, Spool, whole};
 use bytemuck::Zeroable;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -48,20 +48,7 @@ impl PackWriter {
     /// # Errors
     /// When the folder cannot be written.
     pub fn create(target: &Path) -> Result<Self, PackError> {
-        let folder = match target.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // As readable as any new file: the process's umask is taken off this.
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let file = builder
-            .prefix(".fpack-")
-            .tempfile_in(folder)
+        let file = whole::beside(target)
             .map_err(PackError::io(target, "cannot create a file beside it"))?;
         let mut writer = Self {
             target: target.into(),

@@ -128,8 +128,13 @@ fn mips(block: &ViewsBlock) -> Result<Vec<(u32, [f64; 2])>> {
 
 /// The sky alone, on views and by rays.
 fn sky(soup: &TriangleSoup, surfaces: &Surfaces, pack: &Pack) -> Result<[f64; 3]> {
-    let light =
-        Light::Sun(Sun { to_sun: DVec3::Y, sun: [0.0; 3], sky: [1.0; 3], translucency: 0.0 });
+    let light = Light::Sun(Sun {
+        to_sun: DVec3::Y,
+        sun: [0.0; 3],
+        sky: [1.0; 3],
+        translucency: 0.0,
+        darkest: 1.0,
+    });
     let block = ViewsBlock::open(pack)?;
     let level = ViewsLevel::read(&block, 0)?;
     let rays = RayScene::new(soup, surfaces);

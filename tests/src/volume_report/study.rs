@@ -1,14 +1,14 @@
 //! One tree as a volume, in many ways: pruning, codebooks, coarser levels, tri-grid.
 
 use anyhow::Result;
-use forest_draw::{Blending, VolumeScene};
+use forest_draw::VolumeScene;
 use forest_eval::{Errors, Plan, Truth, held_out_views, sweep, volume_contenders};
 use forest_raster::{Picture, Sampling, Style, Surfaces};
 use forest_soup::TriangleSoup;
 use forest_tests::{open, write_volume};
 use forest_volume::{
-    Branching, Centers, Coarse, CodebookOptions, CodebookSize, Detail, Prune, Quality, Space,
-    Stand, Volume, VolumeBlock, VolumeOptions,
+    Blending, Branching, Centers, Coarse, CodebookOptions, CodebookSize, Detail, Prune, Quality,
+    Space, Stand, Volume, VolumeBlock, VolumeOptions,
 };
 use std::fmt::Write;
 use std::time::Instant;

@@ -29,7 +29,7 @@ fn from_above(height: f64, side: u32) -> Camera {
 
 fn lit(to_sun: DVec3, sun: f32, sky: f32, translucency: f32) -> Style {
     let to_sun = to_sun.normalize();
-    let sun = Sun { to_sun, sun: [sun; 3], sky: [sky; 3], translucency };
+    let sun = Sun { to_sun, sun: [sun; 3], sky: [sky; 3], translucency, darkest: 1.0 };
     Style { light: Light::Sun(sun), sampling: Sampling::TRUTH }
 }
 

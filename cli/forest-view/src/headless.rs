@@ -1,0 +1,60 @@
+//! One picture without a window.
+
+use crate::args::Args;
+use crate::orbit::Orbit;
+use crate::output;
+use crate::settings::{Settings, check};
+use crate::truth::Truth;
+use anyhow::{Context, Result};
+use forest_gpu::{
+    Costs, Frame, Gpu, Layer, Look, Model, Options, Renderer, candidates, read_picture,
+};
+use forest_pack::Pack;
+use forest_soup::Camera;
+
+/// Draws the picture that `args` ask for.
+pub(crate) fn run(args: &Args, gpu: &Gpu, pack: &Pack, angles: [f64; 2]) -> Result<()> {
+    let output = args.output.as_ref().context("no --output")?;
+    let renderer = Renderer::new(gpu, &Options::default())?;
+    let mut model = Model::load(gpu, &renderer, pack)?;
+    let settings = Settings::new(args, &model);
+    check(&settings, &model)?;
+    let camera = match args.parallel {
+        true => Camera::around(model.bounds(), angles, None, args.size),
+        false => Orbit::new(model.bounds(), angles, args.distance, args.size).camera(args.size),
+    };
+    let target = renderer.target(gpu, args.size, settings.side)?;
+    let costs = match settings.representation {
+        crate::args::Representation::Auto => {
+            Costs::measure(gpu, &renderer, &mut model, &target, &camera)?
+        }
+        _ => Costs::default(),
+    };
+    let all = candidates(&model, &camera, &costs);
+    let what = settings.what(&model, &camera, &all, None).context("nothing was measured")?;
+    let layers = [Layer::whole(what)];
+    let frame = Frame { camera, light: settings.light, layers: &layers };
+    let drawn = renderer.render(gpu, &mut model, &target, &frame, None)?;
+    gpu.finish()?;
+    let truth = match &args.truth {
+        None => None,
+        Some(path) => Some(Truth::load(path, args.max_triangles)?.picture(
+            &camera,
+            &settings.light,
+            settings.side,
+        )),
+    };
+    let half = args.size[0] as f32 * 0.5;
+    let look = Look {
+        alpha: args.alpha,
+        split: truth.as_ref().map_or(0.0, |_| half.floor()),
+        ..Look::default()
+    };
+    let other = truth.as_ref().map(|t| ([t.width, t.height], &t.pixels[..]));
+    let pixels = read_picture(gpu, &target, &look, other)?;
+    output::write_png(output, args.size, &pixels, args.alpha)?;
+    if !args.quiet {
+        eprintln!("{}: {}", gpu.name(), output::describe(&what, &drawn));
+    }
+    Ok(())
+}

@@ -1,0 +1,131 @@
+//! What a picture is made of: the camera, the light, and the layers.
+
+use bytemuck::{Pod, Zeroable};
+use forest_points::Thresholds;
+use forest_raster::Light;
+use forest_soup::{Camera, Projection};
+use forest_views::Lookup;
+use forest_volume::{Blending, Detail};
+use glam::DVec3;
+
+/// A picture to be drawn.
+#[derive(Clone, Debug)]
+pub struct Frame<'a> {
+    /// From where, with the size of the target in pixels; levels are chosen for these.
+    pub camera: Camera,
+    /// The light, without shadows. Volumes are in the light of their photographs.
+    pub light: Light,
+    /// What is drawn; layers with fades share the samples of the picture.
+    pub layers: &'a [Layer],
+}
+
+/// A level of a representation, or a part of its samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layer {
+    /// What is drawn.
+    pub what: What,
+    /// The share of all samples it is drawn on, as a range within 0 … 1. Two levels fade into each
+    /// other as `[0, t]` and `[t, 1]`: each sample shows one of them, so that nothing is covered
+    /// twice and there are no holes.
+    pub fade: [f32; 2],
+}
+
+/// A level of a representation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum What {
+    /// Points, and triangles where points would be too large.
+    Points(Thresholds),
+    /// Views of a level: an index into the header's.
+    Views(usize, Lookup),
+    /// A volume.
+    Volume(Detail, Blending),
+}
+
+impl Layer {
+    /// All of it.
+    pub fn whole(what: What) -> Self {
+        Self { what, fade: [0.0, 1.0] }
+    }
+}
+
+/// The block that a picture shows, as the camera needs it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stage {
+    /// Middle of the source's box.
+    pub(crate) middle: DVec3,
+    pub(crate) half_diagonal: f64,
+    /// Number of the first triangle for the hash rule.
+    pub(crate) first_triangle: u32,
+}
+
+/// Half the diagonal of a block without extent is taken for this: shaders divide by it.
+const LEAST_SIZE: f64 = 1e-30;
+
+/// `Frame` of common.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct FrameUniform {
+    right: [f32; 3],
+    scale: f32,
+    down: [f32; 3],
+    parallel: u32,
+    forward: [f32; 3],
+    near: f32,
+    size: [f32; 2],
+    depth: [f32; 2],
+    to_sun: [f32; 3],
+    lit: u32,
+    sun: [f32; 3],
+    translucency: f32,
+    sky: [f32; 3],
+    darkest: f32,
+    middle: [f32; 3],
+    half_diagonal: f32,
+    first_triangle: u32,
+    zero: [u32; 3],
+}
+
+impl FrameUniform {
+    /// `camera` must have the size of the samples.
+    pub(crate) fn new(camera: &Camera, light: &Light, stage: &Stage) -> Self {
+        let vector = |v: DVec3| v.as_vec3().to_array();
+        let parallel = matches!(camera.projection, Projection::Orthographic { .. });
+        let off = stage.middle - camera.eye;
+        let half_diagonal = stage.half_diagonal.max(LEAST_SIZE);
+        // A parallel camera sees a tree's length before and behind it.
+        let reach = 4.0 * half_diagonal;
+        // Nothing of the tree is nearer. OpenGL, which stretches 0 … 1 to −1 … 1, rounds what is far
+        // behind this to one depth.
+        let near = (1e-6 * half_diagonal).max(off.dot(camera.forward) - 1.5 * half_diagonal);
+        let nearest = off.dot(camera.forward) - reach;
+        let mut u = Self {
+            right: vector(camera.right),
+            scale: camera.pixels_per_unit(1.0) as f32,
+            down: vector(-camera.up),
+            parallel: parallel.into(),
+            forward: vector(camera.forward),
+            near: near as f32,
+            size: [camera.width as f32, camera.height as f32],
+            depth: [nearest as f32, (0.5 / reach) as f32],
+            half_diagonal: half_diagonal as f32,
+            middle: vector(off),
+            first_triangle: stage.first_triangle,
+            darkest: 1.0,
+            ..Self::zeroed()
+        };
+        if let Light::Sun(sun) = light {
+            u.lit = 1;
+            u.to_sun = vector(sun.to_sun);
+            u.sun = sun.sun;
+            u.translucency = sun.translucency;
+            u.sky = sun.sky;
+            u.darkest = sun.darkest;
+        }
+        u
+    }
+}
+
+/// The camera with `side` times as many pixels along each side.
+pub(crate) fn supersampled(camera: &Camera, side: u32) -> Camera {
+    Camera { width: camera.width * side, height: camera.height * side, ..*camera }
+}

@@ -1,0 +1,133 @@
+//! A pack on a device.
+
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::frame::{Layer, Stage, What};
+use crate::points::PointsModel;
+use crate::renderer::Renderer;
+use crate::views::ViewsModel;
+use crate::volume::VolumeModel;
+use forest_pack::measures::{Light, Measure, Measures};
+use forest_pack::{Pack, kind};
+use forest_points::PointsBlock;
+use forest_views::ViewsBlock;
+use forest_volume::VolumeBlock;
+use glam::DVec3;
+
+/// The representations of a pack, uploaded from its memory map.
+#[derive(Debug)]
+pub struct Model<'p> {
+    pack: &'p Pack,
+    pub(crate) points: Option<PointsModel<'p>>,
+    pub(crate) views: Option<ViewsModel<'p>>,
+    pub(crate) volume: Option<VolumeModel<'p>>,
+    measures: Option<Measures>,
+    stage: Stage,
+    bounds: [DVec3; 2],
+}
+
+impl<'p> Model<'p> {
+    /// Checks and uploads all representations of `pack`.
+    ///
+    /// # Errors
+    /// When a section is damaged or breaks a rule, when the device does not take what is in it, or
+    /// when there is nothing to draw.
+    pub fn load(gpu: &Gpu, renderer: &Renderer, pack: &'p Pack) -> Result<Self, GpuError> {
+        let there = |is_in: bool| is_in.then_some(());
+        let points = there(PointsBlock::is_in(pack))
+            .map(|()| PointsModel::load(gpu, &renderer.points, pack))
+            .transpose()?;
+        let views = there(ViewsBlock::is_in(pack))
+            .map(|()| ViewsModel::load(gpu, &renderer.views, pack))
+            .transpose()?;
+        let volume = there(VolumeBlock::is_in(pack))
+            .map(|()| VolumeModel::load(gpu, &renderer.volume, pack))
+            .transpose()?;
+        let measures = Measures::read(pack)?;
+        gpu.finish()?;
+        let (stage, bounds) = if let Some(p) = &points {
+            let [min, max] = [p.block.header.min, p.block.header.max];
+            (p.stage(), [min, max].map(|v| p.block.to_world(v.into())))
+        } else if let Some(v) = &views {
+            let bounds = v.block.header.bounds.map(|b| v.block.center() + DVec3::from_array(b));
+            (v.stage(), bounds)
+        } else if let Some(v) = &volume {
+            (v.stage(), v.block.header.bounds.map(DVec3::from_array))
+        } else {
+            let pack = pack.path().display().to_string();
+            return Err(GpuError::Nothing { pack });
+        };
+        Ok(Self { pack, points, views, volume, measures, stage, bounds })
+    }
+
+    /// The pack.
+    pub fn pack(&self) -> &'p Pack {
+        self.pack
+    }
+
+    /// The box around the source, in the world.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.bounds
+    }
+
+    /// The points, if the pack has them.
+    pub fn points(&self) -> Option<&PointsBlock<'p>> {
+        self.points.as_ref().map(|p| &p.block)
+    }
+
+    /// The views, if the pack has them.
+    pub fn views(&self) -> Option<&ViewsBlock<'p>> {
+        self.views.as_ref().map(|v| &v.block)
+    }
+
+    /// The volume, if the pack has one.
+    pub fn volume(&self) -> Option<&VolumeBlock<'p>> {
+        self.volume.as_ref().map(|v| &v.block)
+    }
+
+    /// The measured table, if the pack has one.
+    pub fn measures(&self) -> Option<&Measures> {
+        self.measures.as_ref()
+    }
+
+    /// Whether levels can be chosen by the table: it has rows of a representation that is here, under base
+    /// colours.
+    pub fn is_measured(&self) -> bool {
+        let here = |kind: u16| match kind {
+            kind::POINTS_HEADER => self.points.is_some(),
+            kind::VIEWS_HEADER => self.views.is_some(),
+            kind::VOLUME_HEADER => self.volume.is_some(),
+            _ => false,
+        };
+        let counts = |r: &Measure| r.light == Light::Albedo && here(r.representation);
+        self.measures.as_ref().is_some_and(|m| m.rows.iter().any(counts))
+    }
+
+    /// Whether the pack has what `what` draws.
+    ///
+    /// # Errors
+    /// The representation or level that it has not.
+    pub fn check(&self, what: &What) -> Result<(), GpuError> {
+        let missing = match what {
+            What::Points(_) => self.points.is_none().then(|| "points".to_string()),
+            What::Views(level, _) => match &self.views {
+                None => Some("views".into()),
+                Some(v) if *level >= v.block.header.levels.len() => {
+                    Some(format!("level {level} of views"))
+                }
+                Some(_) => None,
+            },
+            What::Volume(..) => self.volume.is_none().then(|| "volume".into()),
+        };
+        let pack = self.pack.path().display().to_string();
+        missing.map_or(Ok(()), |what| Err(GpuError::Missing { pack, what }))
+    }
+
+    pub(crate) fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    pub(crate) fn check_layers(&self, layers: &[Layer]) -> Result<(), GpuError> {
+        layers.iter().try_for_each(|l| self.check(&l.what))
+    }
+}
