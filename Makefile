@@ -42,7 +42,7 @@ gpu: setup
 	@missing=; \
 	ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json 2>/dev/null | grep -q . \
 	  || missing="$$missing mesa-vulkan-drivers"; \
-	ldconfig -p 2>/dev/null | grep -q "libvulkan.so.1 " || missing="$$missing libvulkan1"; \
+	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null | grep -q "libvulkan.so.1 " || missing="$$missing libvulkan1"; \
 	$(INSTALL)
 
 # A virtual screen, and what windows are made with: for the tests of forest-view's.
@@ -51,7 +51,7 @@ screen: setup
 	command -v Xvfb >/dev/null || missing="$$missing xvfb"; \
 	for pair in libX11.so.6:libx11-6 libX11-xcb.so.1:libx11-xcb1 libXcursor.so.1:libxcursor1 \
 	    libXi.so.6:libxi6 libxkbcommon-x11.so.0:libxkbcommon-x11-0; do \
-	  ldconfig -p 2>/dev/null | grep -q "$${pair%:*} " || missing="$$missing $${pair#*:}"; done; \
+	  PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null | grep -q "$${pair%:*} " || missing="$$missing $${pair#*:}"; done; \
 	$(INSTALL)
 
 demo: gpu
