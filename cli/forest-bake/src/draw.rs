@@ -128,9 +128,6 @@ fn positive(text: &str) -> Result<f32, String> {
     if value > 0.0 { Ok(value) } else { Err("it must be above 0".into()) }
 }
 
-/// Linear grey behind the tree.
-const BACKGROUND: f32 = 0.6;
-
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     if args.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(
@@ -318,7 +315,7 @@ fn write(args: &Args, pictures: &[Picture]) -> Result<()> {
         let pixels: Vec<_> = pictures.iter().map(Picture::straight).collect();
         RgbaImage::from_fn(side * n, side, |i, j| image::Rgba(pixels[picture(i)][x(i, j)])).into()
     } else {
-        let pixels: Vec<_> = pictures.iter().map(|p| p.over(BACKGROUND)).collect();
+        let pixels: Vec<_> = pictures.iter().map(|p| p.over(Picture::BACKGROUND)).collect();
         RgbImage::from_fn(side * n, side, |i, j| image::Rgb(pixels[picture(i)][x(i, j)])).into()
     };
     let mut png = Cursor::new(Vec::new());

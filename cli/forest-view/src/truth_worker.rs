@@ -7,14 +7,14 @@ use forest_soup::Camera;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
-/// What a picture is of.
-type Request = (Camera, Light, u32);
+/// What a picture is of: camera, light, samples along the side of a pixel.
+pub(crate) type Request = (Camera, Light, u32);
 
 /// A thread that draws the source for the camera that was asked for last.
 #[derive(Debug)]
 pub(crate) struct TruthWorker {
     requests: Sender<Request>,
-    pictures: Receiver<(Camera, Picture)>,
+    pictures: Receiver<(Request, Picture)>,
     asked: Option<Request>,
 }
 
@@ -31,7 +31,7 @@ impl TruthWorker {
                     request = newer;
                 }
                 let (camera, light, side) = request;
-                if outbox.send((camera, truth.picture(&camera, &light, side))).is_err() {
+                if outbox.send((request, truth.picture(&camera, &light, side))).is_err() {
                     return;
                 }
             }
@@ -40,8 +40,7 @@ impl TruthWorker {
     }
 
     /// Asks for a picture, unless it is the one that was asked for last.
-    pub(crate) fn ask(&mut self, camera: &Camera, light: &Light, side: u32) {
-        let request = (*camera, *light, side);
+    pub(crate) fn ask(&mut self, request: Request) {
         if self.asked != Some(request) {
             self.asked = Some(request);
             // A thread that has ended says so when pictures are taken.
@@ -53,7 +52,7 @@ impl TruthWorker {
     ///
     /// # Errors
     /// When the thread has ended.
-    pub(crate) fn take(&mut self) -> Result<Option<(Camera, Picture)>> {
+    pub(crate) fn take(&mut self) -> Result<Option<(Request, Picture)>> {
         let mut newest = None;
         loop {
             match self.pictures.try_recv() {

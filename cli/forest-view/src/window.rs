@@ -8,7 +8,7 @@ use crate::output;
 use crate::session::Session;
 use crate::settings::{Settings, check};
 use crate::surface::Screen;
-use crate::truth_worker::TruthWorker;
+use crate::truth_worker::{Request, TruthWorker};
 use anyhow::{Context as _, Result};
 use forest_gpu::{
     Candidate, Costs, Drawn, Fader, Frame, Gpu, GpuError, Look, Options, Presenter, Renderer,
@@ -69,8 +69,8 @@ struct Viewer {
     truth: Option<TruthWorker>,
     /// The source is shown on the left.
     split: bool,
-    /// The source's picture that was uploaded last, and the camera it is of.
-    truth_picture: Option<(Camera, Picture)>,
+    /// The source's picture that was uploaded last, and what it is of.
+    truth_picture: Option<(Request, Picture)>,
     pointer: [f64; 2],
     dragging: Option<MouseButton>,
     held: keys::Held,
@@ -334,13 +334,14 @@ impl Viewer {
     /// Asks for the source's picture, and takes it when it is there: pixels that it is shown on.
     fn update_truth(&mut self, camera: &Camera) -> Result<f32> {
         let Some(worker) = self.truth.as_mut().filter(|_| self.split) else { return Ok(0.0) };
-        worker.ask(camera, &self.settings.light, self.settings.side);
-        if let Some((camera, picture)) = worker.take()? {
+        let request = (*camera, self.settings.light, self.settings.side);
+        worker.ask(request);
+        if let Some((of, picture)) = worker.take()? {
             let size = [picture.width, picture.height];
             self.presenter.compare_with(&self.gpu, size, &picture.pixels)?;
-            self.truth_picture = Some((camera, picture));
+            self.truth_picture = Some((of, picture));
         }
-        let fits = self.truth_picture.as_ref().is_some_and(|(c, _)| c == camera);
+        let fits = self.truth_picture.as_ref().is_some_and(|(of, _)| *of == request);
         Ok(if fits { (camera.width / 2) as f32 } else { 0.0 })
     }
 
@@ -394,9 +395,9 @@ impl Viewer {
 
     fn write_picture(&self, path: &Path) -> Result<()> {
         let size = self.target.size();
-        // As the window shows it: only the source's picture of this camera.
-        let camera = self.orbit.camera(size);
-        let other = self.truth_picture.as_ref().filter(|(of, _)| self.split && *of == camera);
+        // As the window shows it: only the source's picture of what is shown.
+        let now = (self.orbit.camera(size), self.settings.light, self.settings.side);
+        let other = self.truth_picture.as_ref().filter(|(of, _)| self.split && *of == now);
         let split = other.map_or(0.0, |_| (size[0] / 2) as f32);
         let look = Look { split, ..Look::default() };
         let other = other.map(|(_, p)| ([p.width, p.height], &p.pixels[..]));

@@ -61,7 +61,8 @@ impl Costs {
         };
         if model.points().is_some() {
             let cut = |finest: f64| {
-                let (finest, largest) = (PixelArea(finest), PixelArea(16.0 * finest));
+                let largest = PixelArea(Thresholds::LARGEST_RATIO * finest);
+                let finest = PixelArea(finest);
                 What::Points(Thresholds { finest, largest, depth_bias: PixelArea(0.0) })
             };
             costs.points = line(time(model, cut(64.0))?, time(model, cut(1.0))?);

@@ -7,6 +7,7 @@ use crate::pipeline;
 use crate::shader::Shader;
 use crate::target::{COLOR, Target};
 use bytemuck::{Pod, Zeroable};
+use forest_raster::Picture;
 use half::f16;
 use wgpu::{
     BindGroup, BindGroupLayout, BindingResource, Buffer, BufferDescriptor, BufferUsages, Color,
@@ -32,7 +33,7 @@ pub struct Look {
 impl Default for Look {
     /// Over the grey that `forest-bake draw` has too.
     fn default() -> Self {
-        Self { background: 0.6, alpha: false, split: 0.0 }
+        Self { background: Picture::BACKGROUND, alpha: false, split: 0.0 }
     }
 }
 

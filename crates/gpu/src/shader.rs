@@ -60,6 +60,7 @@ fn constants() -> String {
         ("CHUNK", CHUNK),
         ("ATLAS_WIDTH", forest_volume::ATLAS_WIDTH),
         ("RAW_SIDE", crate::volume::RAW_SIDE),
+        ("MOST_LEVELS", crate::volume::MOST_LEVELS as u32),
     ];
     let floats = [
         ("FLATNESS_STEPS", f64::from(spheroid::STEPS)),

@@ -11,8 +11,8 @@ use bytemuck::{Pod, Zeroable};
 use forest_pack::Pack;
 use forest_soup::Camera;
 use forest_volume::{
-    ATLAS_WIDTH, Blending, Codewords, Coding, Detail, NodeRecord, Selection, VolumeBlock,
-    select_into,
+    ATLAS_WIDTH, Blending, Branching, Codewords, Coding, Detail, NodeRecord, Selection,
+    VolumeBlock, select_into,
 };
 use glam::DVec3;
 use wgpu::{
@@ -23,8 +23,8 @@ use wgpu::{
 /// Texels along the sides of the textures that hold raw billboards, one after the other.
 pub(crate) const RAW_SIDE: u32 = 2048;
 
-/// Levels of the deepest tree.
-const MOST_LEVELS: usize = 9;
+/// Levels of the deepest tree, the root included.
+pub(crate) const MOST_LEVELS: usize = Branching::Octree.most_levels() as usize + 1;
 
 /// `Shown` of volume.wgsl.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]

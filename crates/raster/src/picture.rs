@@ -20,6 +20,9 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Linear grey that people see a tree before, in files and windows.
+    pub const BACKGROUND: f32 = 0.6;
+
     /// A picture of nothing.
     pub fn empty(width: u32, height: u32) -> Self {
         let n = width as usize * height as usize;

@@ -27,7 +27,7 @@ impl Branching {
     }
 
     /// Most levels below the root: cells along an axis stay below 256.
-    pub fn most_levels(self) -> u32 {
+    pub const fn most_levels(self) -> u32 {
         match self {
             Self::Octree => 8,
             Self::TriGrid => 5,

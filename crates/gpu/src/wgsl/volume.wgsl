@@ -36,7 +36,7 @@ struct Volume {
     over: u32,
     coded: u32,
     cameras: array<Shown, 2>,
-    levels: array<Level, 9>,
+    levels: array<Level, MOST_LEVELS>,
 }
 
 struct Item {
