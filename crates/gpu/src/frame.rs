@@ -54,8 +54,6 @@ pub(crate) struct Stage {
     /// Middle of the source's box.
     pub(crate) middle: DVec3,
     pub(crate) half_diagonal: f64,
-    /// Number of the first triangle for the hash rule.
-    pub(crate) first_triangle: u32,
 }
 
 /// Half the diagonal of a block without extent is taken for this: shaders divide by it.
@@ -81,8 +79,6 @@ pub(crate) struct FrameUniform {
     darkest: f32,
     middle: [f32; 3],
     half_diagonal: f32,
-    first_triangle: u32,
-    zero: [u32; 3],
 }
 
 impl FrameUniform {
@@ -109,7 +105,6 @@ impl FrameUniform {
             depth: [nearest as f32, (0.5 / reach) as f32],
             half_diagonal: half_diagonal as f32,
             middle: vector(off),
-            first_triangle: stage.first_triangle,
             darkest: 1.0,
             ..Self::zeroed()
         };

@@ -42,9 +42,16 @@ pub(crate) struct CellUniform {
     fine: i32,
     coarse: i32,
     fade: [f32; 2],
+    turn: [f32; 2],
+    size: f32,
+    radii: u32,
+    first_point: u32,
+    first_triangle: u32,
+    mask: u32,
+    zero: u32,
 }
 
-/// `Chunk` of splat.wgsl.
+/// `Chunk` of chunk.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct Chunk {
@@ -132,11 +139,7 @@ impl<'p> PointsModel<'p> {
 
     /// Half the diagonal and the middle of the block.
     pub(crate) fn stage(&self) -> Stage {
-        Stage {
-            middle: self.block.middle(),
-            half_diagonal: self.block.half_diagonal(),
-            first_triangle: self.block.points.len() as u32,
-        }
+        Stage { middle: self.block.middle(), half_diagonal: self.block.half_diagonal() }
     }
 
     /// Chooses and uploads what `layers` draw for `camera`.
@@ -223,6 +226,14 @@ fn cell_uniform(block: &PointsBlock, cell: &CellRecord, camera: &Camera) -> Cell
         fine: 0,
         coarse: 0,
         fade: [0.0; 2],
+        turn: [1.0, 0.0],
+        size: 1.0,
+        radii: 0,
+        first_point: 0,
+        // Points and triangles have different numbers for the hash rule.
+        first_triangle: block.points.len() as u32,
+        mask: 0,
+        zero: 0,
     }
 }
 

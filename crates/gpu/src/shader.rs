@@ -8,6 +8,13 @@ use wgpu::{Device, ShaderModule, ShaderModuleDescriptor, ShaderSource};
 const COMMON: &str = include_str!("wgsl/common.wgsl");
 const CELL: &str = include_str!("wgsl/cell.wgsl");
 const POINTS: &str = include_str!("wgsl/points.wgsl");
+const LIT_BLOCK: &str = include_str!("wgsl/lit_block.wgsl");
+const CHUNKS: &str = include_str!("wgsl/chunk.wgsl");
+const SPLAT_BOX: &str = include_str!("wgsl/splat_box.wgsl");
+const KEEP64: &str = include_str!("wgsl/keep64.wgsl");
+const KEEP32: &str = include_str!("wgsl/keep32.wgsl");
+const LARGE: &str = include_str!("wgsl/points_large.wgsl");
+const TRIANGLES: &str = include_str!("wgsl/triangles.wgsl");
 
 /// Names the share of samples that fading layers draw, among the uses of the hash rule.
 const FADE: u32 = 0x6661_6465;
@@ -32,11 +39,17 @@ impl Shader {
     pub(crate) fn text(self) -> String {
         const SPLAT: &str = include_str!("wgsl/splat.wgsl");
         let parts: &[&str] = match self {
-            Self::Splat64 => &[COMMON, CELL, POINTS, SPLAT, include_str!("wgsl/keep64.wgsl")],
-            Self::Splat32 => &[COMMON, CELL, POINTS, SPLAT, include_str!("wgsl/keep32.wgsl")],
-            Self::Points => &[COMMON, CELL, POINTS, include_str!("wgsl/points_draw.wgsl")],
-            Self::Triangles => &[COMMON, CELL, include_str!("wgsl/triangles.wgsl")],
-            Self::Views => &[COMMON, include_str!("wgsl/views.wgsl")],
+            Self::Splat64 => &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNKS, SPLAT_BOX, SPLAT, KEEP64],
+            Self::Splat32 => &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNKS, SPLAT_BOX, SPLAT, KEEP32],
+            Self::Points => {
+                let small = include_str!("wgsl/points_small.wgsl");
+                &[COMMON, LIT_BLOCK, CELL, POINTS, LARGE, small]
+            }
+            Self::Triangles => {
+                let block = include_str!("wgsl/triangles_block.wgsl");
+                &[COMMON, LIT_BLOCK, CELL, TRIANGLES, block]
+            }
+            Self::Views => &[COMMON, LIT_BLOCK, include_str!("wgsl/views.wgsl")],
             Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],
             Self::Present => &[include_str!("wgsl/present.wgsl")],
         };

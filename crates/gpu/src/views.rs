@@ -110,7 +110,7 @@ impl<'p> ViewsModel<'p> {
 
     pub(crate) fn stage(&self) -> Stage {
         let (middle, half_diagonal) = (self.block.center(), self.block.half_diagonal());
-        Stage { middle, half_diagonal, first_triangle: 0 }
+        Stage { middle, half_diagonal }
     }
 
     /// Uploads what `layers` draw for `camera`, which has the size of the samples. Views are chosen

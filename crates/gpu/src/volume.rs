@@ -137,7 +137,7 @@ impl<'p> VolumeModel<'p> {
     pub(crate) fn stage(&self) -> Stage {
         let [low, high] = self.block.header.bounds.map(DVec3::from_array);
         let half_diagonal = 0.5 * low.distance(high);
-        Stage { middle: 0.5 * (low + high), half_diagonal, first_triangle: 0 }
+        Stage { middle: 0.5 * (low + high), half_diagonal }
     }
 
     /// Chooses and uploads what `layers` draw for `camera`.

@@ -1,4 +1,4 @@
-// A cell of a points block as one layer draws it.
+// A cell of a points block as one layer, or one instance, draws it.
 struct Cell {
     // Of the cell's zero, from the eye.
     origin: vec3f,
@@ -9,4 +9,28 @@ struct Cell {
     coarse: i32,
     // Share of the samples.
     fade: vec2f,
+    // Cosine and sine of the angle that it is turned by about the vertical.
+    turn: vec2f,
+    // World units of a unit of radii, and the first of its radii.
+    size: f32,
+    radii: u32,
+    // Numbers of points and triangles for the hash rule: what is added to their indices, and what
+    // tells instances apart.
+    first_point: u32,
+    first_triangle: u32,
+    mask: u32,
+    zero: u32,
+}
+
+// A vector of the block in the world.
+fn turned(turn: vec2f, v: vec3f) -> vec3f {
+    return vec3f(turn.x * v.x + turn.y * v.z, v.y, turn.x * v.z - turn.y * v.x);
+}
+
+fn place_in(cell: Cell, steps: vec3u) -> vec3f {
+    return cell.origin + turned(cell.turn, vec3f(steps) * cell.step);
+}
+
+fn point_number(cell: Cell, index: u32) -> u32 {
+    return (index + cell.first_point) ^ cell.mask;
 }

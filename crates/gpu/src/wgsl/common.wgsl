@@ -26,8 +26,6 @@ struct Frame {
     // Of the block, from the eye, and half its diagonal: what Z of the self-shadow is measured by.
     middle: vec3f,
     half_diagonal: f32,
-    // Number of the first triangle for the hash rule.
-    first_triangle: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -111,13 +109,6 @@ fn fades_in(fade: vec2f, at: vec2u) -> bool {
 
 fn srgb_to_linear(c: vec3f) -> vec3f {
     return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
-}
-
-// Share of the sun that is estimated to be seen (Gilet et al. 2005, section 5.3): falls from 1 at the
-// side of the block nearest to the sun to `darkest` at the far one.
-fn sun_seen(place: vec3f) -> f32 {
-    let z = clamp(-dot(place - frame.middle, frame.to_sun) / frame.half_diagonal, -1.0, 1.0);
-    return 1.0 - 0.5 * (z + 1.0) * (1.0 - frame.darkest);
 }
 
 // Factors on a base colour: forest_raster::Sun. The normal faces the eye.

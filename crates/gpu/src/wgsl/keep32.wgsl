@@ -1,4 +1,4 @@
-// Without 64-bit atomics: two runs, the first for the depths, the second for the numbers of the
+// Without 64-bit atomics: two runs, the first for the depths, the second for what is known of the
 // points that have them. The buffer is the same in the end.
 
 @group(2) @binding(0) var<storage, read_write> kept: array<atomic<u32>>;
@@ -6,25 +6,25 @@
 // 0 for the first run, 1 for the second.
 override RUN: u32 = 0u;
 
-fn keep(sample: u32, value: u32, id: u32) {
+fn keep(sample: u32, value: u32, payload: u32) {
     if RUN == 0u {
         atomicMax(&kept[2u * sample + 1u], value);
     } else if atomicLoad(&kept[2u * sample + 1u]) == value {
-        atomicMax(&kept[2u * sample], id);
+        atomicMax(&kept[2u * sample], payload);
     }
 }
 
-fn large_point(e: Ellipse, id: u32, cell: u32, fade: vec2f, a: vec2i, b: vec2i) {
-    if RUN == 0u {
-        let slot = atomicAdd(&large.instances, 1u);
-        if slot < arrayLength(&large.points) {
-            large.points[slot] = vec2u(id, cell);
-        } else {
-            splat_box(e, id, fade, a, b);
-        }
-    } else if atomicLoad(&large.instances) > arrayLength(&large.points) {
-        // Some did not find a place in the list. Those that did change nothing here, unless they
-        // lie in the very depth that was kept, and are as good.
-        splat_box(e, id, fade, a, b);
+// Whether a large point is in the list, or as good as that.
+fn listed(index: u32, cell: u32) -> bool {
+    if RUN != 0u {
+        // If some did not find a place, all are filled again. Those that did change nothing, unless
+        // they lie in the very depth that was kept, and are as good.
+        return atomicLoad(&large.instances) <= arrayLength(&large.points);
     }
+    let slot = atomicAdd(&large.instances, 1u);
+    if slot < arrayLength(&large.points) {
+        large.points[slot] = vec2u(index, cell);
+        return true;
+    }
+    return false;
 }

@@ -2,15 +2,19 @@
 
 @group(2) @binding(0) var<storage, read_write> kept: array<atomic<u64>>;
 
-fn keep(sample: u32, value: u32, id: u32) {
-    atomicMax(&kept[sample], (u64(value) << 32u) | u64(id));
+// There is one run.
+override RUN: u32 = 0u;
+
+fn keep(sample: u32, value: u32, payload: u32) {
+    atomicMax(&kept[sample], (u64(value) << 32u) | u64(payload));
 }
 
-fn large_point(e: Ellipse, id: u32, cell: u32, fade: vec2f, a: vec2i, b: vec2i) {
+// Whether a large point is in the list.
+fn listed(index: u32, cell: u32) -> bool {
     let slot = atomicAdd(&large.instances, 1u);
     if slot < arrayLength(&large.points) {
-        large.points[slot] = vec2u(id, cell);
-    } else {
-        splat_box(e, id, fade, a, b);
+        large.points[slot] = vec2u(index, cell);
+        return true;
     }
+    return false;
 }

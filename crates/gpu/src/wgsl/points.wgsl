@@ -24,15 +24,19 @@ fn is_drawn(cell: Cell, bits: u32) -> bool {
     return own <= select(cell.fine, cell.coarse, (bits >> 31u) != 0u);
 }
 
+fn point_axis(turn: vec2f, p: vec4u) -> vec3f {
+    return turned(turn, decode_axis(vec2u((p.y >> 16u) & 0xffu, p.y >> 24u)));
+}
+
 fn ellipse(cell: Cell, p: vec4u) -> Ellipse {
-    let steps = vec3f(vec3u(p.x & 0xffffu, p.x >> 16u, p.y & 0xffffu));
-    let place = cell.origin + steps * cell.step;
+    let place = place_in(cell, vec3u(p.x & 0xffffu, p.x >> 16u, p.y & 0xffffu));
     let at = project(place);
-    let axis = decode_axis(vec2u((p.y >> 16u) & 0xffu, p.y >> 24u));
+    let axis = point_axis(cell.turn, p);
     var e: Ellipse;
     e.center = at.xy;
     e.depth = at.z;
-    e.radius = radii[p.w & 0xfffu] * select(frame.scale / at.z, frame.scale, frame.parallel != 0u);
+    let radius = radii[cell.radii + (p.w & 0xfffu)] * cell.size;
+    e.radius = radius * select(frame.scale / at.z, frame.scale, frame.parallel != 0u);
     let flat = f32((p.w >> 24u) & 0x7fu) / FLATNESS_STEPS;
     let c = dot(axis, to_eye(place));
     let c2 = min(c * c, 1.0);
@@ -52,11 +56,12 @@ fn contains(e: Ellipse, at: vec2f) -> bool {
     return dot(d, d) + along * along * e.squeeze <= e.radius * e.radius;
 }
 
-// Lit colour of a point that is seen at `at` in depth `depth`.
-fn point_color(p: vec4u, at: vec2f, depth: f32) -> vec4f {
+// Lit colour of a point that is turned by `turn` and is seen at `at` in depth `depth`.
+fn point_color(turn: vec2f, p: vec4u, at: vec2f, depth: f32) -> vec4f {
     let rgb = srgb_to_linear(vec3f(vec3u(p.z & 0xffu, (p.z >> 8u) & 0xffu, (p.z >> 16u) & 0xffu)) / 255.0);
     let place = unproject(at, depth);
-    let axis = decode_axis(vec2u((p.y >> 16u) & 0xffu, p.y >> 24u));
+    let axis = point_axis(turn, p);
     let normal = select(axis, -axis, dot(axis, to_eye(place)) < 0.0);
-    return vec4f(rgb * light(normal, sun_seen(place), 1.0), 1.0);
+    let seen = seen_at(place);
+    return vec4f(rgb * light(normal, seen.x, seen.y), 1.0);
 }

@@ -1,42 +1,8 @@
-// The compute shader of small points. Of every sample the nearest point is kept: the upper word is
-// its depth value, the lower one the complement of its number (of equal depths the first wins).
-
-// Pixels of the largest box that is filled here.
-override SPLAT_MOST: u32 = 256u;
-
-struct Chunk {
-    cell: u32,
-    first: u32,
-    count: u32,
-    // Keeps 16 bytes.
-    zero: u32,
-}
+// The compute shader of the small points of a block. The complement of a point's index is kept: of
+// equal depths the first point wins.
 
 @group(1) @binding(3) var<storage, read> chunks: array<Chunk>;
-
-struct Large {
-    // Arguments of an indirect draw.
-    vertices: u32,
-    instances: atomic<u32>,
-    first_vertex: u32,
-    first_instance: u32,
-    // Number of point and cell.
-    points: array<vec2u>,
-}
-
 @group(1) @binding(4) var<storage, read_write> large: Large;
-
-fn splat_box(e: Ellipse, id: u32, fade: vec2f, from_pixel: vec2i, to_pixel: vec2i) {
-    let value = bitcast<u32>(depth_value(e.depth));
-    for (var y = from_pixel.y; y <= to_pixel.y; y++) {
-        for (var x = from_pixel.x; x <= to_pixel.x; x++) {
-            let at = vec2u(vec2i(x, y));
-            if contains(e, vec2f(at) + 0.5) && covers(id, at, e.opacity) && fades_in(fade, at) {
-                keep(at.y * u32(frame.size.x) + at.x, value, ~id);
-            }
-        }
-    }
-}
 
 @compute @workgroup_size(CHUNK)
 fn splat(
@@ -44,13 +10,12 @@ fn splat(
     @builtin(num_workgroups) groups: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let number = group.y * groups.x + group.x;
-    let chunk = chunks[number];
+    let chunk = chunks[group.y * groups.x + group.x];
     if lane >= chunk.count {
         return;
     }
-    let id = chunk.first + lane;
-    let p = points[id];
+    let index = chunk.first + lane;
+    let p = points[index];
     let cell = cells[chunk.cell];
     if !is_drawn(cell, p.w) {
         return;
@@ -59,19 +24,14 @@ fn splat(
     if is_behind(e.depth) {
         return;
     }
-    // Pixels whose middle may lie inside. What reaches out of the picture is cut before it becomes
-    // an integer.
-    let low = clamp(ceil(e.center - e.reach - 0.5), vec2f(0.0), frame.size);
-    let high = clamp(floor(e.center + e.reach - 0.5), vec2f(-1.0), frame.size - 1.0);
-    let a = vec2i(low);
-    let b = vec2i(high);
-    if a.x > b.x || a.y > b.y {
+    let box = box_of(e);
+    if box.x > box.z || box.y > box.w {
         return;
     }
-    let n = b - a + 1;
-    if u32(n.x * n.y) > SPLAT_MOST {
-        large_point(e, id, chunk.cell, cell.fade, a, b);
+    let n = box.zw - box.xy + 1;
+    // Large points that find a place in the list are drawn as quads.
+    if u32(n.x * n.y) > SPLAT_MOST && listed(index, chunk.cell) {
         return;
     }
-    splat_box(e, id, cell.fade, a, b);
+    splat_box(e, point_number(cell, index), cell.fade, box, ~index);
 }

@@ -38,7 +38,8 @@ struct Corner {
     @location(0) uv: vec2f,
     @location(1) normal: vec3f,
     @location(2) tint: vec4f,
-    @location(3) sunlit: f32,
+    // Shares of the sun and of the sky that are seen.
+    @location(3) seen: vec2f,
     // Number of the triangle, material, and cell.
     @location(4) @interpolate(flat) what: vec3u,
 }
@@ -48,8 +49,8 @@ fn half_word(triangle: u32, n: u32) -> u32 {
     return (triangles[triangle * 10u + (n >> 1u)] >> ((n & 1u) * 16u)) & 0xffffu;
 }
 
-@vertex
-fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) cell_index: u32) -> Corner {
+// Corner number `index` of all, in a cell.
+fn corner(index: u32, cell_index: u32) -> Corner {
     let triangle = index / 3u;
     let first = (index % 3u) * 6u;
     let cell = cells[cell_index];
@@ -59,7 +60,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) cell_index
         half_word(triangle, first + 1u),
         half_word(triangle, first + 2u),
     );
-    let place = cell.origin + vec3f(steps) * cell.step;
+    let place = place_in(cell, steps);
     let along = dot(place, frame.forward);
     let off = vec2f(dot(place, frame.right), -dot(place, frame.down)) * frame.scale * 2.0 / frame.size;
     if frame.parallel != 0u {
@@ -72,13 +73,13 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) cell_index
     out.uv = m.uv_min + m.uv_step
         * vec2f(f32(half_word(triangle, first + 3u)), f32(half_word(triangle, first + 4u)));
     let axis = half_word(triangle, first + 5u);
-    out.normal = decode_axis(vec2u(axis & 0xffu, axis >> 8u));
+    out.normal = turned(cell.turn, decode_axis(vec2u(axis & 0xffu, axis >> 8u)));
     out.tint = vec4f(1.0);
     if (m.flags & 2u) != 0u {
         let c = unpack4x8unorm(colors[index]);
         out.tint = vec4f(srgb_to_linear(c.rgb), c.a);
     }
-    out.sunlit = sun_seen(place);
+    out.seen = seen_at(place);
     out.what = vec3u(triangle, material, cell_index);
     return out;
 }
@@ -132,9 +133,10 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
         coverage = clamp(alpha, 0.0, 1.0);
     }
     // Points and triangles have different numbers for the hash rule (SPEC.md, section 5.4).
-    let id = frame.first_triangle + in.what.x;
+    let cell = cells[in.what.z];
+    let id = (in.what.x + cell.first_triangle) ^ cell.mask;
     let opacity = u32(round(coverage * 255.0));
-    if !(covers(id, at, opacity) && fades_in(cells[in.what.z].fade, at)) {
+    if !(covers(id, at, opacity) && fades_in(cell.fade, at)) {
         discard;
     }
     rgb *= in.tint.rgb;
@@ -142,5 +144,5 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
         return vec4f(rgb, 1.0);
     }
     let toward = select(-in.normal, in.normal, front);
-    return vec4f(rgb * light(normalize(toward), in.sunlit, 1.0), 1.0);
+    return vec4f(rgb * light(normalize(toward), in.seen.x, in.seen.y), 1.0);
 }
