@@ -13,6 +13,8 @@
 //! mean alpha: no mips, whose filtered alpha an alpha test would get wrong. What is partly
 //! transparent covers a sample by the hash rule ([`covers`]); nothing is blended or sorted.
 //!
+//! A [`Grove`] is many instances of a few soups, by the same rays: the truth of landscapes.
+//!
 //! [`CaptureScene`] takes many parallel views of one soup, fast and with less care for single
 //! samples: what view atlases are baked from. [`layers()`] finds what rays meet behind the first
 //! thing too.
@@ -45,6 +47,7 @@
 mod canvas;
 mod capture;
 mod composite;
+mod grove;
 mod layers;
 mod light;
 mod list;
@@ -56,10 +59,12 @@ mod rays;
 mod sampling;
 mod sprite;
 mod surface;
+mod trace;
 
 pub use canvas::{Style, draw};
 pub use capture::{Buffers, Capture, CaptureScene, DeepHit, DeepPicture, Skylight, Subject};
 pub use composite::{Layer, composite};
+pub use grove::{Grove, Kind, Planted};
 pub use layers::{LayerHit, layers};
 pub use light::{Light, Sun};
 pub use list::{Corner, DisplayList, Ellipse, Projector};

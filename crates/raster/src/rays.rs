@@ -6,41 +6,38 @@
 //! materials and the hash rule of opacity.
 
 use crate::canvas::Style;
-use crate::light::{Light, Sun};
 use crate::mesh::extent;
-use crate::opacity::{covers, mix};
-use crate::picture::{Picture, PixelMean};
-use crate::sampling::Pattern;
+use crate::opacity::covers;
+use crate::picture::Picture;
 use crate::surface::Surfaces;
-use forest_soup::{Camera, Projection, TriangleSoup};
+use crate::trace::{Ball, LIFT, Sample, Seen, View, hierarchy, ray, units, window};
+use forest_soup::{Camera, TriangleSoup};
 use glam::{Vec2, Vec3, Vec3A};
-use obvhs::BvhBuildParams;
 use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
-use rayon::prelude::*;
-use std::time::Duration;
 
 /// A soup, ready to be seen by rays.
 pub struct RayScene<'a> {
     soup: &'a TriangleSoup,
     surfaces: &'a Surfaces,
     bvh: CwBvh,
+    /// Around the hierarchy; `None` if it is empty.
+    ball: Option<Ball>,
     /// In the order of the hierarchy's leaves.
     triangles: Vec<Triangle>,
     /// Their numbers in the soup.
     ids: Vec<u32>,
-    /// World units to units of the hierarchy, a power of two: the library takes anything nearer
-    /// than 10⁻⁴ to a ray's start for missed, so the soup is made about [`EXTENT`] wide.
+    /// World units to units of the hierarchy ([`units`]).
     scale: f32,
 }
 
-/// Width of the soup in the units of the hierarchy, within a factor of two.
-const EXTENT: f64 = 1024.0;
-
-/// Distance by which secondary rays start off their surface, in those units.
-const LIFT: f32 = 1e-5 * EXTENT as f32;
+/// A triangle that a ray meets, by its place in the hierarchy, and where.
+#[derive(Clone, Copy)]
+pub(crate) struct Hit {
+    i: usize,
+    at: Meeting,
+}
 
 /// Where a ray meets a triangle: distance and barycentric coordinates of corners 1 and 2.
 #[derive(Clone, Copy)]
@@ -50,6 +47,13 @@ struct Meeting {
     v: f32,
 }
 
+impl Hit {
+    /// Distance from the ray's start, in units of the hierarchy.
+    pub(crate) fn distance(&self) -> f32 {
+        self.at.t
+    }
+}
+
 impl<'a> RayScene<'a> {
     /// Builds the hierarchy. `surfaces` are those of the soup's materials; triangles with corners
     /// that are not finite are left out.
@@ -57,10 +61,7 @@ impl<'a> RayScene<'a> {
     /// # Panics
     /// If the soup breaks its own rules ([`TriangleSoup::validate`]).
     pub fn new(soup: &'a TriangleSoup, surfaces: &'a Surfaces) -> Self {
-        let scale = match extent(soup) {
-            extent if extent > 0.0 => (EXTENT / extent).log2().floor().clamp(-120.0, 120.0).exp2(),
-            _ => 1.0,
-        } as f32;
+        let scale = units(extent(soup));
         let all: Vec<(u32, Triangle)> = (0..soup.triangles.len())
             .filter(|&i| soup.corners(i).iter().all(|p| p.is_finite()))
             .map(|i| {
@@ -69,122 +70,106 @@ impl<'a> RayScene<'a> {
             })
             .collect();
         let triangles: Vec<Triangle> = all.iter().map(|t| t.1).collect();
-        let mut unused = Duration::default();
-        let bvh = build_cwbvh_from_tris(&triangles, BvhBuildParams::fast_build(), &mut unused);
+        let bvh = hierarchy(&triangles, 3);
         let order = bvh.primitive_indices.iter().map(|&i| all[i as usize]);
         let (ids, triangles) = order.unzip();
-        Self { soup, surfaces, bvh, triangles, ids, scale }
+        let ball = Ball::around(&bvh.total_aabb);
+        Self { soup, surfaces, bvh, ball, triangles, ids, scale }
     }
 
     /// What `camera` sees, with the shadows that `style`'s sun casts.
     pub fn picture(&self, camera: &Camera, style: &Style) -> Picture {
-        let pattern = Pattern::new(style.sampling);
-        let mut out = Picture::empty(camera.width, camera.height);
-        let share = 1.0 / pattern.count() as f32;
-        let rows: Vec<Picture> = (0..camera.height)
-            .into_par_iter()
-            .map(|y| {
-                let mut row = Picture::empty(camera.width, 1);
-                for x in 0..camera.width {
-                    let (xs, ys) = pattern.pixel(x, y);
-                    let mut mean = PixelMean::default();
-                    for s in 0..pattern.count() {
-                        let at = [f64::from(x) + f64::from(xs[s]), f64::from(y) + f64::from(ys[s])];
-                        let grid = pattern.grid(x, y, s);
-                        if let Some((rgb, depth, normal)) = self.sample(camera, style, at, grid) {
-                            let [r, g, b] = rgb;
-                            mean.add([r, g, b, 1.0], depth, normal.to_array(), share);
-                        }
-                    }
-                    mean.store(&mut row, x as usize);
-                }
-                row
-            })
-            .collect();
-        for (y, row) in rows.into_iter().enumerate() {
-            let first = y * camera.width as usize;
-            out.pixels[first..][..row.pixels.len()].copy_from_slice(&row.pixels);
-            out.depth[first..][..row.depth.len()].copy_from_slice(&row.depth);
-            out.normal[first..][..row.normal.len()].copy_from_slice(&row.normal);
-        }
-        out
+        window(style, [0, 0], [camera.width, camera.height], |at, grid| {
+            self.sample(camera, style, at, grid)
+        })
     }
 
-    /// Linear RGB, depth and normal at picture coordinates `at`.
+    /// World units to units of the hierarchy.
+    pub(crate) fn units(&self) -> f32 {
+        self.scale
+    }
+
+    /// The ball around the hierarchy; `None` if it is empty.
+    pub(crate) fn ball(&self) -> Option<&Ball> {
+        self.ball.as_ref()
+    }
+
+    /// Corners of all triangles about the soup's zero, in units of the hierarchy.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = Vec3A> {
+        self.triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2])
+    }
+
+    /// What the ray through picture coordinates `at` sees.
     fn sample(
         &self,
         camera: &Camera,
         style: &Style,
         at: [f64; 2],
         grid: (u32, u32),
-    ) -> Option<([f32; 3], f32, Vec3)> {
-        let (ray, start, slant) = self.primary(camera, at)?;
-        let mut hit = RayHit::none();
-        self.bvh.ray_traverse(ray, &mut hit, |ray, i| {
-            self.meet(ray, i, grid).map_or(f32::INFINITY, |m| m.t)
+    ) -> Option<Sample> {
+        let (first, start, slant) = self.primary(camera, at)?;
+        let hit = self.nearest(first, 0, grid)?;
+        let seen = self.seen(hit, first.direction.into())?;
+        let rgb = seen.color(&style.light, grid, |behind, direction| {
+            let before = Vec3::from(first.origin + first.direction * hit.at.t) + seen.own * LIFT;
+            let from = if behind { before - seen.own * (2.0 * LIFT) } else { before };
+            self.is_free(ray(from.into(), direction.into()), 0, grid)
         });
-        let i = hit.primitive_id as usize;
-        let m = meet(self.triangles.get(i)?, &ray)?;
-        let (uv, tint) = self.attributes(i, m);
-        let material = self.soup.triangle_materials[self.ids[i] as usize];
-        let surface = self.surfaces.get(material)?;
-        let rgb = surface.at(uv, tint).0;
-        let (own, normal) = self.normals(i, m, Vec3::from(ray.direction));
-        let factors = match &style.light {
-            Light::Sun(sun) if !surface.is_unlit() => {
-                let place = Vec3::from(ray.origin + ray.direction * m.t) + own * LIFT;
-                self.lit(sun, place, own, normal, grid)
-            }
-            _ => [1.0; 3],
-        };
-        let depth = ((start + f64::from(m.t) * slant) / f64::from(self.scale)) as f32;
-        Some((std::array::from_fn(|k| rgb[k] * factors[k]), depth, normal))
+        let depth = ((start + f64::from(hit.at.t) * slant) / f64::from(self.scale)) as f32;
+        Some(Sample { rgb, depth, normal: seen.normal })
     }
 
     /// The ray through `at`, the depth at which it starts, and the depth it gains per unit: all in
     /// units of the hierarchy.
     fn primary(&self, camera: &Camera, at: [f64; 2]) -> Option<(Ray, f64, f64)> {
-        let right = at[0] - f64::from(camera.width) * 0.5;
-        let up = f64::from(camera.height) * 0.5 - at[1];
-        let aside = |pixels: f64| (camera.right * right + camera.up * up) / pixels;
+        let ball = self.ball.as_ref()?;
+        let View { offset, direction, slant, endless } = View::new(camera, at);
         let scale = f64::from(self.scale);
-        let eye = (camera.eye - self.soup.origin) * scale;
-        // Rays that start just before the scene meet it where single precision is dense.
-        let bounds = self.bvh.total_aabb;
-        let middle = (bounds.min + bounds.max) * 0.5;
-        let radius = f64::from((bounds.max - bounds.min).length()) * 0.5;
-        if !radius.is_finite() {
-            return None; // nothing there
-        }
-        let center = Vec3::from(middle).as_dvec3();
-        let reach = 1.001 * radius;
-        Some(match camera.projection {
-            Projection::Orthographic { .. } => {
-                let from = eye + aside(camera.pixels_per_unit(1.0)) * scale;
-                let start = (center - from).dot(camera.forward) - reach;
-                let origin = (from + camera.forward * start).as_vec3a();
-                (ray(origin, camera.forward.as_vec3a()), start, 1.0)
-            }
-            Projection::Perspective { .. } => {
-                let direction = camera.forward + aside(camera.pixels_per_unit(1.0));
-                let slant = 1.0 / direction.length();
-                let direction = direction * slant;
-                let ahead = ((center - eye).dot(direction) - reach).max(1e-6 * radius);
-                let origin = (eye + direction * ahead).as_vec3a();
-                (ray(origin, direction.as_vec3a()), ahead * slant, slant)
-            }
+        let from = (camera.eye - self.soup.origin) * scale + offset * scale;
+        let nearest = if endless { f64::NEG_INFINITY } else { 1e-6 * ball.radius };
+        let ahead = ball.start(from, direction, nearest)?;
+        let origin = (from + direction * ahead).as_vec3a();
+        Some((ray(origin, direction.as_vec3a()), ahead * slant, slant))
+    }
+
+    /// The first that a ray in units of the hierarchy hits. `salt` tells apart scenes whose
+    /// partly transparent triangles must not cover the same samples.
+    pub(crate) fn nearest(&self, ray: Ray, salt: u32, grid: (u32, u32)) -> Option<Hit> {
+        let mut hit = RayHit::none();
+        self.bvh.ray_traverse(ray, &mut hit, |ray, i| {
+            self.meet(ray, i, salt, grid).map_or(f32::INFINITY, |m| m.t)
+        });
+        let i = hit.primitive_id as usize;
+        let at = meet(self.triangles.get(i)?, &ray)?;
+        Some(Hit { i, at })
+    }
+
+    /// Whether such a ray hits nothing.
+    pub(crate) fn is_free(&self, ray: Ray, salt: u32, grid: (u32, u32)) -> bool {
+        self.bvh.ray_traverse_miss(ray, |ray, i| {
+            self.meet(ray, i, salt, grid).map_or(f32::INFINITY, |m| m.t)
         })
     }
 
+    /// What a ray of this direction sees where it hits.
+    pub(crate) fn seen(&self, hit: Hit, direction: Vec3) -> Option<Seen> {
+        let (uv, tint) = self.attributes(hit.i, hit.at);
+        let material = self.soup.triangle_materials[self.ids[hit.i] as usize];
+        let surface = self.surfaces.get(material)?;
+        let rgb = surface.at(uv, tint).0;
+        let (own, normal) = self.normals(hit.i, hit.at, direction);
+        Some(Seen { rgb, unlit: surface.is_unlit(), own, normal })
+    }
+
     /// Where the ray meets triangle `i`, if the triangle covers there for sample `grid`.
-    fn meet(&self, ray: &Ray, i: usize, grid: (u32, u32)) -> Option<Meeting> {
+    fn meet(&self, ray: &Ray, i: usize, salt: u32, grid: (u32, u32)) -> Option<Meeting> {
         let m = meet(&self.triangles[i], ray)?;
         let id = self.ids[i];
         let surface = self.surfaces.get(self.soup.triangle_materials[id as usize])?;
         if surface.translucent {
             let (uv, tint) = self.attributes(i, m);
             let opacity = (surface.at(uv, tint).1 * 255.0).round() as u8;
-            covers(id, grid.0, grid.1, opacity).then_some(m)
+            covers(id ^ salt, grid.0, grid.1, opacity).then_some(m)
         } else {
             Some(m)
         }
@@ -221,45 +206,6 @@ impl<'a> RayScene<'a> {
         };
         (own * sign, shading * sign)
     }
-
-    /// Factors on the base colour, with a ray to the sun and one to the sky.
-    fn lit(&self, sun: &Sun, place: Vec3, own: Vec3, normal: Vec3, grid: (u32, u32)) -> [f32; 3] {
-        let to_sun = sun.to_sun.as_vec3();
-        let cos = normal.dot(to_sun);
-        let sunlit = (cos > 0.0 || sun.translucency > 0.0) && {
-            // Light on the far side starts from there.
-            let from = if own.dot(to_sun) < 0.0 { place - own * (2.0 * LIFT) } else { place };
-            self.is_free(from, to_sun, grid)
-        };
-        let [a, b] = [0, 1].map(|salt| {
-            let hash = mix(mix(mix(grid.0) ^ grid.1.rotate_left(13)) ^ (0x51ed_270b + salt));
-            (hash >> 8) as f32 / 16_777_216.0
-        });
-        let up = cosine_weighted(normal, a, b);
-        let skylit = own.dot(up) > 0.0 && self.is_free(place, up, grid);
-        sun.factors(normal, f32::from(sunlit), f32::from(skylit))
-    }
-
-    /// Whether nothing is hit on the way out.
-    fn is_free(&self, from: Vec3, direction: Vec3, grid: (u32, u32)) -> bool {
-        self.bvh.ray_traverse_miss(ray(from.into(), direction.into()), |ray, i| {
-            self.meet(ray, i, grid).map_or(f32::INFINITY, |m| m.t)
-        })
-    }
-}
-
-/// A ray without negative zeros: the library takes the sign of −0 one way for the direction and the
-/// other way for its inverse, and misses everything.
-fn ray(origin: Vec3A, direction: Vec3A) -> Ray {
-    Ray::new_inf(origin, direction + Vec3A::ZERO)
-}
-
-/// A direction about unit vector `n` with density cosine over π, from two uniform numbers.
-fn cosine_weighted(n: Vec3, a: f32, b: f32) -> Vec3 {
-    let (x, y) = n.any_orthonormal_pair();
-    let (sin, cos) = (std::f32::consts::TAU * a).sin_cos();
-    let r = b.sqrt();
-    x * (r * cos) + y * (r * sin) + n * (1.0 - b).max(0.0).sqrt()
 }
 
 fn meet(t: &Triangle, ray: &Ray) -> Option<Meeting> {

@@ -1,6 +1,6 @@
 use super::*;
-use crate::{Sampling, rasterize};
-use forest_soup::{AlphaMode, Material};
+use crate::{Light, Sampling, Sun, rasterize};
+use forest_soup::{AlphaMode, Material, Projection};
 use glam::DVec3;
 
 fn soup(triangles: &[[Vec3; 3]]) -> TriangleSoup {
