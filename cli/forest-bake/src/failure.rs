@@ -5,6 +5,7 @@ use forest_export::ExportError;
 use forest_import::ImportError;
 use forest_pack::PackError;
 use forest_points::BakeError;
+use forest_scene::SceneError;
 use forest_soup::FlattenError;
 use forest_views::ViewsError;
 use forest_volume::VolumeError;
@@ -41,6 +42,9 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
         return Some(e.exit_code());
     }
     if let Some(e) = cause.downcast_ref::<PackError>() {
+        return Some(e.exit_code());
+    }
+    if let Some(e) = cause.downcast_ref::<SceneError>() {
         return Some(e.exit_code());
     }
     if let Some(e) = cause.downcast_ref::<BakeError>() {

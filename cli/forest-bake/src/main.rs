@@ -10,6 +10,7 @@ mod levels;
 mod light;
 mod output;
 mod points;
+mod scene;
 mod source;
 mod target;
 mod verify;
@@ -48,6 +49,8 @@ enum Command {
     Capture(capture::Args),
     /// Write views as textures for engines: PNG, EXR, KTX2.
     Export(export::Args),
+    /// Make a landscape of packs, or plant the trees of a scene file anew.
+    Scene(scene::Args),
     /// Draw a picture of a pack, at one or several levels of detail.
     Draw(draw::Args),
     /// Judge a pack against its source: error by cost, view and distance, beside other ways.
@@ -90,6 +93,7 @@ fn run(args: Args) -> anyhow::Result<()> {
         Command::Volume(a) => volume::run(&a, quiet),
         Command::Capture(a) => capture::run(&a, quiet),
         Command::Export(a) => export::run(&a, quiet),
+        Command::Scene(a) => scene::run(&a, quiet),
         Command::Draw(a) => draw::run(&a, quiet),
         Command::Eval(a) => eval::run(&a, quiet),
         Command::Inspect(a) => inspect::run(&a),

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 #[derive(Parser, Debug)]
 #[command(name = "forest-view", version, max_term_width = 100)]
 pub(crate) struct Args {
-    /// Pack to show.
+    /// Pack to show, or scene file (.toml) of a landscape.
     #[arg(value_name = "PACK", required_unless_present = "list_adapters")]
     pub(crate) pack: Option<PathBuf>,
     /// Draw one picture, without a window.
@@ -28,6 +28,9 @@ pub(crate) struct Args {
     /// front, back, left, right, top, diagonal, or YAW,PITCH in degrees: where the camera stands.
     #[arg(long, default_value = "front", value_name = "VIEW", allow_hyphen_values = true)]
     pub(crate) view: String,
+    /// Camera of a scene file, by its name; default: its first one.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
     /// Distance of the camera in half diagonals of the tree's box; default: as near as shows all of it.
     /// The picture is 40 degrees high.
     #[arg(long, value_name = "RADII", value_parser = positive)]
@@ -48,6 +51,10 @@ pub(crate) struct Args {
     /// k, added to both at the back of the block and taken from them at its front.
     #[arg(long, default_value_t = 0.0, value_name = "PX2", allow_hyphen_values = true)]
     pub(crate) bias: f64,
+    /// Scenes: power of the share of a tree that is seen by which --finest grows where the rest is
+    /// hidden; 0 draws what is hidden as finely as what is seen.
+    #[arg(long, default_value_t = 2.0 / 3.0, value_name = "POWER", value_parser = not_negative)]
+    pub(crate) hidden: f64,
     /// How views are looked up.
     #[arg(long, value_enum, default_value = "depth")]
     pub(crate) lookup: LookupArg,
@@ -87,7 +94,8 @@ pub(crate) struct Args {
     /// Refuse a --truth of more triangles.
     #[arg(long, default_value_t = 50_000_000, value_name = "N", requires = "truth")]
     pub(crate) max_triangles: u64,
-    /// Measure pictures along the camera path of this file instead of showing one.
+    /// Measure pictures along the camera path of this file, or of a scene file along its path of this
+    /// name, instead of showing one.
     #[arg(long, value_name = "PATH", requires = "json")]
     #[arg(conflicts_with_all = ["headless", "truth", "screenshot"])]
     pub(crate) bench: Option<PathBuf>,

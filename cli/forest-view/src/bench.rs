@@ -37,7 +37,7 @@ struct Key {
 const MOST_FRAMES: u32 = 100_000;
 
 /// Pictures that are drawn before any is timed.
-const WARM_UP: usize = 10;
+pub(crate) const WARM_UP: usize = 10;
 
 impl CameraPath {
     fn read(path: &Path) -> Result<Self> {
@@ -100,16 +100,16 @@ struct Report {
 
 /// Of all pictures.
 #[derive(Debug, Serialize)]
-struct Percentiles {
-    mean: f64,
-    p50: f64,
-    p95: f64,
-    p99: f64,
+pub(crate) struct Percentiles {
+    pub(crate) mean: f64,
+    pub(crate) p50: f64,
+    pub(crate) p95: f64,
+    pub(crate) p99: f64,
 }
 
 impl Percentiles {
     /// Of at least one value; by the nearest rank.
-    fn of(values: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn of(values: impl Iterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);
         let rank = |p: f64| values[((p * values.len() as f64).ceil() as usize).max(1) - 1];

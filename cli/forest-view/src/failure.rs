@@ -3,6 +3,7 @@
 use forest_gpu::GpuError;
 use forest_import::ImportError;
 use forest_pack::PackError;
+use forest_scene::SceneError;
 use forest_soup::FlattenError;
 use std::process::ExitCode;
 
@@ -30,9 +31,13 @@ pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
         if cause.is::<serde_json::Error>() || cause.is::<FlattenError>() {
             return Some(3);
         }
+        if let Some(e) = cause.downcast_ref::<SceneError>() {
+            return Some(e.exit_code());
+        }
         if let Some(e) = cause.downcast_ref::<GpuError>() {
             return Some(match e {
                 GpuError::Pack(e) => e.exit_code(),
+                GpuError::Scene(e) => e.exit_code(),
                 GpuError::Missing { .. } => 1,
                 GpuError::Nothing { .. } => 3,
                 _ => 4,

@@ -8,6 +8,7 @@ mod hud;
 mod keys;
 mod orbit;
 mod output;
+mod scene;
 mod session;
 mod settings;
 mod surface;
@@ -21,8 +22,11 @@ use clap::Parser;
 use failure::Usage;
 use forest_gpu::Gpu;
 use forest_pack::Pack;
+use forest_scene::Scene;
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
+use std::time::Instant;
 
 fn main() -> ExitCode {
     let args = match Args::try_parse() {
@@ -43,6 +47,17 @@ fn main() -> ExitCode {
     }
 }
 
+fn run_scene(args: &Args, path: &Path) -> Result<()> {
+    let start = Instant::now();
+    let scene = Scene::open(path)?;
+    let instance = forest_gpu::instance(args.adapter.is_some(), None);
+    let gpu = Gpu::open(&instance, args.adapter.as_deref(), None)?;
+    match args.bench {
+        Some(_) => scene::bench(args, &gpu, &scene, start),
+        None => scene::headless(args, &gpu, &scene),
+    }
+}
+
 fn run(args: &Args) -> Result<()> {
     if args.list_adapters {
         let instance = forest_gpu::instance(true, None);
@@ -55,6 +70,9 @@ fn run(args: &Args) -> Result<()> {
         return Ok(());
     }
     let path = args.pack.as_ref().context("no pack")?;
+    if scene::is_scene(path) {
+        return run_scene(args, path);
+    }
     // Before a device is opened: wrong packs are told as such on any machine.
     let pack = Pack::open(path)?;
     let angles = forest_soup::named_view(&args.view)

@@ -59,4 +59,7 @@ pub enum GpuError {
     /// The pack is damaged or breaks a rule.
     #[error(transparent)]
     Pack(#[from] PackError),
+    /// The scene is.
+    #[error(transparent)]
+    Scene(#[from] forest_scene::SceneError),
 }

@@ -120,6 +120,13 @@ impl FrameUniform {
     }
 }
 
+impl FrameUniform {
+    /// With another nearest distance.
+    pub(crate) fn with_near(self, near: f64) -> Self {
+        Self { near: near as f32, ..self }
+    }
+}
+
 /// The camera with `side` times as many pixels along each side.
 pub(crate) fn supersampled(camera: &Camera, side: u32) -> Camera {
     Camera { width: camera.width * side, height: camera.height * side, ..*camera }

@@ -45,6 +45,7 @@ mod costs;
 mod device;
 mod error;
 mod frame;
+mod landscape;
 mod model;
 mod pipeline;
 mod points;
@@ -64,6 +65,9 @@ pub use costs::Costs;
 pub use device::{Display, Gpu, adapters, describe, instance};
 pub use error::GpuError;
 pub use frame::{Frame, Layer, What};
+pub use landscape::{
+    Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget,
+};
 pub use model::Model;
 pub use present::{Look, Presenter, Shown, read_picture, read_samples};
 pub use renderer::{Drawn, Options, Renderer};

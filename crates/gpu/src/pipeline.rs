@@ -24,7 +24,19 @@ pub(crate) fn opaque(
     entries: [&str; 2],
     topology: PrimitiveTopology,
 ) -> RenderPipeline {
-    build(device, module, layout, entries, topology, None, true)
+    let nearer = CompareFunction::Greater;
+    build(device, module, layout, entries, topology, None, Some(nearer))
+}
+
+/// A triangle about the picture that covers whatever is there.
+pub(crate) fn covering(
+    device: &Device,
+    module: &ShaderModule,
+    layout: &PipelineLayout,
+) -> RenderPipeline {
+    let entries = ["vertex", "fragment"];
+    let list = PrimitiveTopology::TriangleList;
+    build(device, module, layout, entries, list, None, Some(CompareFunction::Always))
 }
 
 /// Strips of premultiplied colours, each over what was drawn before, hidden by what is opaque.
@@ -36,7 +48,7 @@ pub(crate) fn blended(
 ) -> RenderPipeline {
     let strip = PrimitiveTopology::TriangleStrip;
     let over = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
-    build(device, module, layout, entries, strip, over, false)
+    build(device, module, layout, entries, strip, over, None)
 }
 
 /// A triangle about a picture of this format, without depth.
@@ -59,14 +71,14 @@ fn build(
     entries: [&str; 2],
     topology: PrimitiveTopology,
     blend: Option<BlendState>,
-    writes_depth: bool,
+    written: Option<CompareFunction>,
 ) -> RenderPipeline {
     let target = ColorTargetState { format: COLOR, blend, write_mask: ColorWrites::ALL };
     let depth = DepthStencilState {
         format: DEPTH,
-        depth_write_enabled: Some(writes_depth),
+        depth_write_enabled: Some(written.is_some()),
         // 1 is near. Of equal depths the first wins.
-        depth_compare: Some(CompareFunction::Greater),
+        depth_compare: Some(written.unwrap_or(CompareFunction::Greater)),
         stencil: Default::default(),
         bias: Default::default(),
     };

@@ -25,7 +25,8 @@ use wgpu::{
 const STRIP: PrimitiveTopology = PrimitiveTopology::TriangleStrip;
 
 /// 64-bit atomics.
-const WIDE: Features = Features::SHADER_INT64.union(Features::SHADER_INT64_ATOMIC_MIN_MAX);
+pub(crate) const WIDE: Features =
+    Features::SHADER_INT64.union(Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
 /// Most large points of a picture that are drawn as quads; what is beyond takes the slow way.
 const MOST_LARGE: u64 = 1 << 20;
@@ -54,7 +55,7 @@ pub(crate) struct CellUniform {
 /// `Chunk` of chunk.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct Chunk {
+pub(crate) struct ChunkRecord {
     cell: u32,
     first: u32,
     count: u32,
@@ -79,7 +80,7 @@ pub(crate) struct PointsModel<'p> {
 struct PointsFrame {
     cut: Cut,
     cells: Vec<CellUniform>,
-    chunks: Vec<Chunk>,
+    chunks: Vec<ChunkRecord>,
     dispatch: [u32; 2],
     /// Triangles and the cell they are of.
     draws: Vec<(std::ops::Range<u32>, u32)>,
@@ -104,7 +105,7 @@ impl<'p> PointsModel<'p> {
         let cells = gpu.buffer("cells of points", rows, storage)?;
         // Dispatches are rectangles: up to twice as many chunks are asked for.
         let most: u32 = block.cells.iter().map(|c| c.points.div_ceil(CHUNK)).sum();
-        let rows = (padded(most as usize * MOST_LAYERS) * size_of::<Chunk>()) as u64;
+        let rows = (padded(most as usize * MOST_LAYERS) * size_of::<ChunkRecord>()) as u64;
         let chunks = gpu.buffer("chunks of points", rows, storage)?;
         let most = block.points.len() as u64 * MOST_LAYERS as u64;
         let list = most.min(MOST_LARGE) * 8 + LIST_START;
@@ -131,7 +132,9 @@ impl<'p> PointsModel<'p> {
         );
         let triangles = match block.triangles.is_empty() {
             true => None,
-            false => Some(TrianglesModel::load(gpu, &pass.triangles_layout, pack, &block, &cells)?),
+            false => {
+                Some(TrianglesModel::load(gpu, &pass.triangles_layout, pack, &block, &cells, None)?)
+            }
         };
         let frame = PointsFrame::default();
         Ok(Self { block, triangles, cells, chunks, large, splat_group, draw_group, frame })
@@ -173,7 +176,7 @@ impl<'p> PointsModel<'p> {
                 });
                 for first in cut.points.clone().step_by(CHUNK as usize) {
                     let count = CHUNK.min(cut.points.end - first);
-                    frame.chunks.push(Chunk { cell, first, count, zero: 0 });
+                    frame.chunks.push(ChunkRecord { cell, first, count, zero: 0 });
                 }
                 frame.drawn.points += cut.points.len() as u64;
                 frame.drawn.triangles += cut.triangles.len() as u64;
@@ -185,7 +188,7 @@ impl<'p> PointsModel<'p> {
         let across = MOST_GROUPS.min(frame.chunks.len());
         let down = frame.chunks.len().div_ceil(across.max(1));
         frame.dispatch = [across as u32, down as u32];
-        frame.chunks.resize(across * down, Chunk::zeroed());
+        frame.chunks.resize(across * down, ChunkRecord::zeroed());
         gpu.queue.write_buffer(&self.cells, 0, bytemuck::cast_slice(&frame.cells));
         gpu.queue.write_buffer(&self.chunks, 0, bytemuck::cast_slice(&frame.chunks));
         // Four corners, no instance yet.

@@ -1,7 +1,8 @@
 //! The shaders: WGSL files put together, with the constants of the crates whose rules they follow.
 
 use crate::CHUNK;
-use forest_points::spheroid;
+use crate::landscape;
+use forest_points::{SizeCode, spheroid};
 use forest_views as views;
 use wgpu::{Device, ShaderModule, ShaderModuleDescriptor, ShaderSource};
 
@@ -9,7 +10,8 @@ const COMMON: &str = include_str!("wgsl/common.wgsl");
 const CELL: &str = include_str!("wgsl/cell.wgsl");
 const POINTS: &str = include_str!("wgsl/points.wgsl");
 const LIT_BLOCK: &str = include_str!("wgsl/lit_block.wgsl");
-const CHUNKS: &str = include_str!("wgsl/chunk.wgsl");
+const CHUNK_OF: &str = include_str!("wgsl/chunk.wgsl");
+const LARGE_LIST: &str = include_str!("wgsl/large_list.wgsl");
 const SPLAT_BOX: &str = include_str!("wgsl/splat_box.wgsl");
 const KEEP64: &str = include_str!("wgsl/keep64.wgsl");
 const KEEP32: &str = include_str!("wgsl/keep32.wgsl");
@@ -32,6 +34,22 @@ pub(crate) enum Shader {
     Views,
     Volume,
     Present,
+    Landscape(Step),
+}
+
+/// The shaders of a landscape.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    Ground,
+    Start,
+    Nearness,
+    /// With 64-bit atomics, or without.
+    Choose(bool),
+    Between,
+    Splat(bool),
+    Resolve,
+    Large,
+    Triangles,
 }
 
 impl Shader {
@@ -39,8 +57,12 @@ impl Shader {
     pub(crate) fn text(self) -> String {
         const SPLAT: &str = include_str!("wgsl/splat.wgsl");
         let parts: &[&str] = match self {
-            Self::Splat64 => &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNKS, SPLAT_BOX, SPLAT, KEEP64],
-            Self::Splat32 => &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNKS, SPLAT_BOX, SPLAT, KEEP32],
+            Self::Splat64 => {
+                &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, SPLAT, KEEP64]
+            }
+            Self::Splat32 => {
+                &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, SPLAT, KEEP32]
+            }
             Self::Points => {
                 let small = include_str!("wgsl/points_small.wgsl");
                 &[COMMON, LIT_BLOCK, CELL, POINTS, LARGE, small]
@@ -52,6 +74,7 @@ impl Shader {
             Self::Views => &[COMMON, LIT_BLOCK, include_str!("wgsl/views.wgsl")],
             Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],
             Self::Present => &[include_str!("wgsl/present.wgsl")],
+            Self::Landscape(step) => return [constants(), step.text()].concat(),
         };
         [constants(), parts.concat()].concat()
     }
@@ -64,6 +87,37 @@ impl Shader {
     }
 }
 
+impl Step {
+    fn text(self) -> String {
+        const LIGHT: &str = include_str!("wgsl/landscape/light.wgsl");
+        const NEARNESS: &str = include_str!("wgsl/landscape/nearness.wgsl");
+        const TREES: &str = include_str!("wgsl/landscape/trees.wgsl");
+        let keep = |wide| if wide { KEEP64 } else { KEEP32 };
+        let parts: &[&str] = match self {
+            Self::Ground => &[LIGHT, include_str!("wgsl/landscape/ground.wgsl")],
+            Self::Start => &[include_str!("wgsl/landscape/start.wgsl")],
+            Self::Nearness => &[include_str!("wgsl/landscape/near.wgsl")],
+            Self::Choose(wide) => {
+                let choose = include_str!("wgsl/landscape/choose.wgsl");
+                let shared = [LIGHT, CELL, POINTS, CHUNK_OF, SPLAT_BOX, NEARNESS, TREES];
+                return [COMMON, &shared.concat(), choose, keep(wide)].concat();
+            }
+            Self::Between => return include_str!("wgsl/landscape/steps.wgsl").into(),
+            Self::Splat(wide) => {
+                let splat = include_str!("wgsl/landscape/splat.wgsl");
+                let shared = [LIGHT, CELL, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, NEARNESS];
+                return [COMMON, &shared.concat(), splat, keep(wide)].concat();
+            }
+            Self::Resolve => &[LIGHT, include_str!("wgsl/landscape/resolve.wgsl")],
+            Self::Large => &[LIGHT, CELL, POINTS, LARGE],
+            Self::Triangles => {
+                &[LIGHT, CELL, TRIANGLES, include_str!("wgsl/landscape/triangles.wgsl")]
+            }
+        };
+        [COMMON, &parts.concat()].concat()
+    }
+}
+
 /// Numbers that the Rust code has too.
 fn constants() -> String {
     let words = [
@@ -72,10 +126,21 @@ fn constants() -> String {
         ("COVER", views::COVER),
         ("CHUNK", CHUNK),
         ("ATLAS_WIDTH", forest_volume::ATLAS_WIDTH),
+        ("TILE", forest_scene::TILE as u32),
+        ("PATCH", forest_scene::PATCH),
+        ("BLOCK", landscape::BLOCK),
+        ("PROBE", landscape::PROBE),
+        ("MOST_NEARNESS", landscape::MOST_NEARNESS as u32),
+        ("MOST_BANDS", landscape::MOST_BANDS as u32),
+        ("RUN_TRIANGLES", landscape::RUN_TRIANGLES),
         ("RAW_SIDE", crate::volume::RAW_SIDE),
         ("MOST_LEVELS", crate::volume::MOST_LEVELS as u32),
     ];
     let floats = [
+        ("DEPTH_STEPS", f64::from(forest_scene::DEPTH_STEPS)),
+        ("LEAST_SHARE", landscape::LEAST_SHARE),
+        ("SIZE_TOP", SizeCode::LOG2_TOP),
+        ("SIZES_PER_OCTAVE", SizeCode::PER_OCTAVE),
         ("FLATNESS_STEPS", f64::from(spheroid::STEPS)),
         ("THINNEST", spheroid::THINNEST),
         ("OFF_STEPS", views::OFF_STEPS),

@@ -22,6 +22,7 @@ pub struct Target {
     pub(crate) side: u32,
     pub(crate) color: Texture,
     pub(crate) color_view: TextureView,
+    pub(crate) depth: Texture,
     pub(crate) depth_view: TextureView,
     /// Eight bytes a sample.
     pub(crate) kept: Buffer,
@@ -70,7 +71,7 @@ impl Target {
         };
         let read = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
         let color = texture("colour", COLOR, read);
-        let depth = texture("depth", DEPTH, TextureUsages::empty());
+        let depth = texture("depth", DEPTH, TextureUsages::TEXTURE_BINDING);
         let bytes = 8 * u64::from(width) * u64::from(height);
         let kept = gpu.buffer("samples of points", bytes, BufferUsages::STORAGE)?;
         let group =
@@ -83,6 +84,7 @@ impl Target {
             color_view: color.create_view(&Default::default()),
             depth_view: depth.create_view(&Default::default()),
             color,
+            depth,
             kept,
         })
     }

@@ -40,16 +40,18 @@ struct ImageRecord {
 #[derive(Debug)]
 pub(crate) struct TrianglesModel {
     group: BindGroup,
+    bytes: u64,
 }
 
 impl TrianglesModel {
-    /// Those of `block`; `cells` is the table of what a frame draws.
+    /// Those of `block`; `cells` is the table of what a frame draws, `runs` that of a landscape.
     pub(crate) fn load(
         gpu: &Gpu,
         layout: &BindGroupLayout,
         pack: &Pack,
         block: &PointsBlock,
         cells: &Buffer,
+        runs: Option<BindingResource>,
     ) -> Result<Self, GpuError> {
         let (materials, textures) = read_materials(pack)?;
         let sizes: Vec<[u32; 2]> = textures.iter().map(|t| [t.width, t.height]).collect();
@@ -73,21 +75,22 @@ impl TrianglesModel {
         let materials = gpu.storage("materials", &[bytemuck::cast_slice(&materials)])?;
         let images = gpu.storage("images", &[bytemuck::cast_slice(&images)])?;
         let colors = gpu.storage("vertex colours", &[colors])?;
-        let sheet = array_view(&sheet.texture);
-        let group = bind::group(
-            &gpu.device,
-            "triangles",
-            layout,
-            &[
-                triangles.as_entire_binding(),
-                cells.as_entire_binding(),
-                materials.as_entire_binding(),
-                images.as_entire_binding(),
-                colors.as_entire_binding(),
-                BindingResource::TextureView(&sheet),
-            ],
-        );
-        Ok(Self { group })
+        let sheet_texture = sheet.texture;
+        let sheet = array_view(&sheet_texture);
+        let tables = [&triangles, cells, &materials, &images, &colors];
+        let mut all: Vec<BindingResource> = tables.map(Buffer::as_entire_binding).into();
+        all.push(BindingResource::TextureView(&sheet));
+        all.extend(runs);
+        let group = bind::group(&gpu.device, "triangles", layout, &all);
+        let [width, height] = [sheet_texture.width(), sheet_texture.height()].map(u64::from);
+        let texels = 4 * width * height * u64::from(sheet_texture.depth_or_array_layers());
+        let bytes = texels + triangles.size() + materials.size() + images.size() + colors.size();
+        Ok(Self { group, bytes })
+    }
+
+    /// Bytes that they take on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     pub(crate) fn group(&self) -> &BindGroup {

@@ -22,7 +22,7 @@ impl SizeCode {
     pub const MIN: Self = Self(0);
     /// log₂ of the area that [`SizeCode::INFINITE`] would have. The block lies in the unit ball,
     /// so that no footprint is larger than π < 2².
-    const LOG2_TOP: f64 = 2.0;
+    pub const LOG2_TOP: f64 = 2.0;
 
     /// The code with this number; numbers above 4095 do not exist.
     pub fn from_bits(bits: u16) -> Option<Self> {

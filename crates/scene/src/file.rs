@@ -55,6 +55,14 @@ pub struct LandSpec {
     pub steep: [u8; 3],
 }
 
+impl Default for LandSpec {
+    /// A flat square kilometre of grass.
+    fn default() -> Self {
+        let (color, steep) = (usual_ground(), usual_steep());
+        Self { size: 1000.0, fractal: None, heightmap: None, color, steep }
+    }
+}
+
 fn usual_ground() -> [u8; 3] {
     [86, 92, 50]
 }
@@ -141,6 +149,14 @@ pub struct SpeciesSpec {
     /// box, else the middle of the box's bottom.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub anchor: Option<[f64; 3]>,
+}
+
+impl Default for SpeciesSpec {
+    /// One of no pack yet.
+    fn default() -> Self {
+        let (pack, scale) = (PathBuf::new(), usual_scale());
+        Self { pack, weight: one(), scale, height: None, anchor: None }
+    }
 }
 
 fn usual_scale() -> [f64; 2] {

@@ -13,18 +13,3 @@ fn keep(sample: u32, value: u32, payload: u32) {
         atomicMax(&kept[2u * sample], payload);
     }
 }
-
-// Whether a large point is in the list, or as good as that.
-fn listed(index: u32, cell: u32) -> bool {
-    if RUN != 0u {
-        // If some did not find a place, all are filled again. Those that did change nothing, unless
-        // they lie in the very depth that was kept, and are as good.
-        return atomicLoad(&large.instances) <= arrayLength(&large.points);
-    }
-    let slot = atomicAdd(&large.instances, 1u);
-    if slot < arrayLength(&large.points) {
-        large.points[slot] = vec2u(index, cell);
-        return true;
-    }
-    return false;
-}

@@ -8,13 +8,3 @@ override RUN: u32 = 0u;
 fn keep(sample: u32, value: u32, payload: u32) {
     atomicMax(&kept[sample], (u64(value) << 32u) | u64(payload));
 }
-
-// Whether a large point is in the list.
-fn listed(index: u32, cell: u32) -> bool {
-    let slot = atomicAdd(&large.instances, 1u);
-    if slot < arrayLength(&large.points) {
-        large.points[slot] = vec2u(index, cell);
-        return true;
-    }
-    return false;
-}

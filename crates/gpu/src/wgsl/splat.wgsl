@@ -2,7 +2,6 @@
 // equal depths the first point wins.
 
 @group(1) @binding(3) var<storage, read> chunks: array<Chunk>;
-@group(1) @binding(4) var<storage, read_write> large: Large;
 
 @compute @workgroup_size(CHUNK)
 fn splat(

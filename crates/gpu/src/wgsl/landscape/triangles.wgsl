@@ -11,10 +11,12 @@ struct Run {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Corner {
+    var none: Corner;
+    if instance >= arrayLength(&runs) {
+        return none;
+    }
     let run = runs[instance];
     if index / 3u >= run.count {
-        // Behind everything: no picture.
-        var none: Corner;
         return none;
     }
     return corner(3u * run.first + index, run.cell);

@@ -1,0 +1,319 @@
+//! A landscape on a device.
+
+use crate::bind;
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::frame::FrameUniform;
+use crate::landscape::frame::{Bands, LandUniform, LandscapeDrawn, LightMapUniform};
+use crate::landscape::pass::LandscapeRenderer;
+use crate::landscape::tables::Tables;
+use crate::landscape::{MOST_BANDS, RUN_TRIANGLES};
+use crate::points::{CellUniform, ChunkRecord};
+use crate::triangles::TrianglesModel;
+use bytemuck::{Pod, Zeroable};
+use forest_raster::Light;
+use forest_scene::{
+    Canopy, Casters, Ground, OpacityMap, PATCH, Patch, Scene, Stance, Tile, ground_vertices,
+    instances,
+};
+use glam::DVec3;
+use wgpu::{
+    BindGroup, BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferSize, BufferUsages,
+};
+
+/// Cells that are drawn of all trees of a frame.
+const MOST_CELLS: u64 = 1 << 18;
+/// Runs of points of a band.
+const MOST_CHUNKS: u64 = 1 << 19;
+/// Trees of a band whose cells are chosen one by one.
+const MOST_NEAR: u64 = 1 << 16;
+/// Points of a frame that are drawn as quads.
+const MOST_LARGE: u64 = 1 << 18;
+/// Runs of triangles of a frame, of each species.
+const MOST_RUNS: u32 = 1 << 15;
+
+/// Words of `Work` before its list.
+pub(crate) const WORK_HEAD: usize = 8;
+
+/// Texels along the longer side of the opacity maps, and metres of the smallest.
+const MAP_SIDE: u32 = 2048;
+const MAP_TEXEL: f64 = 1.0;
+
+/// Points that stand for a tree in the opacity maps: a few a texel of its own width.
+const CANOPY: std::ops::RangeInclusive<f64> = 8.0..=256.0;
+
+/// `Patch` of ground.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct PatchRecord {
+    corner: [u32; 2],
+    stride: u32,
+    skirt: f32,
+}
+
+/// `Grid` of ground.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct GridUniform {
+    points: [u32; 2],
+    cell: [f32; 2],
+}
+
+/// A scene on a device.
+#[derive(Debug)]
+pub struct Landscape<'s> {
+    scene: &'s Scene,
+    ground: Ground,
+    tiles: Vec<Tile>,
+    reach: Vec<f64>,
+    maps: [LightMapUniform; 2],
+    light: Light,
+    pub(crate) frame: Buffer,
+    pub(crate) land: Buffer,
+    pub(crate) land_group: BindGroup,
+    patches: Buffer,
+    pub(crate) ground_group: BindGroup,
+    tile_list: Buffer,
+    pub(crate) work: Buffer,
+    pub(crate) arguments: Buffer,
+    pub(crate) steps_group: BindGroup,
+    pub(crate) draws: Buffer,
+    pub(crate) large: Buffer,
+    pub(crate) large_group: BindGroup,
+    pub(crate) triangles: Vec<Option<TrianglesModel>>,
+    pub(crate) counted: Buffer,
+    /// What the groups of a target's passes bind of it.
+    pub(crate) choose: Vec<Buffer>,
+    pub(crate) splat: Vec<Buffer>,
+    pub(crate) bands: Bands,
+    pub(crate) patch_count: u32,
+    bytes: u64,
+}
+
+impl<'s> Landscape<'s> {
+    /// Uploads a scene, and makes its opacity maps for its sun and for the sky.
+    ///
+    /// # Errors
+    /// When a pack is damaged or lacks points, or the device does not take what is in it: prune packs
+    /// with `forest-bake needs`.
+    pub fn load(
+        gpu: &Gpu,
+        renderer: &LandscapeRenderer,
+        scene: &'s Scene,
+    ) -> Result<Self, GpuError> {
+        let mut tables = Tables::default();
+        let blocks: Vec<_> = scene.species.iter().map(|s| s.points()).collect::<Result<_, _>>()?;
+        for (species, block) in scene.species.iter().zip(&blocks) {
+            tables.add(species, block)?;
+        }
+        for (i, record) in (0..).zip(&mut tables.species) {
+            (record.first_run, record.runs) = (i * MOST_RUNS, MOST_RUNS);
+        }
+        let storage = BufferUsages::STORAGE;
+        let table = |what: &str, bytes: &[u8]| gpu.storage(what, &[bytes]);
+        let parts: Vec<&[u8]> = blocks.iter().map(|b| bytemuck::cast_slice(b.points)).collect();
+        let points = gpu.storage("points of all species", &parts)?;
+        let cells = gpu.buffer("cells of trees", MOST_CELLS * 64, storage)?;
+        let radii = table("radii", bytemuck::cast_slice(&tables.radii))?;
+        let trees = table("trees", bytemuck::cast_slice(&scene.trees))?;
+        let species = table("species", bytemuck::cast_slice(&tables.species))?;
+        let stocks = table("cells of species", bytemuck::cast_slice(&tables.stocks))?;
+        let work_bytes = WORK_HEAD as u64 * 4 + MOST_NEAR * 8;
+        let work = gpu.buffer("work", work_bytes, storage | BufferUsages::COPY_SRC)?;
+        let chunk = size_of::<ChunkRecord>() as u64;
+        let chunks = gpu.buffer("chunks of points", MOST_CHUNKS * chunk, storage)?;
+        let prefixes = table("prefixes", bytemuck::cast_slice(&tables.prefixes))?;
+        let sizes = table("sizes of triangles", bytemuck::cast_slice(&tables.triangle_sizes))?;
+        let kinds = scene.species.len() as u64;
+        let runs_each = u64::from(MOST_RUNS) * 16;
+        let runs = gpu.buffer("runs of triangles", kinds * runs_each, storage)?;
+        let indirect = storage | BufferUsages::INDIRECT;
+        let draws = gpu.buffer("draws of triangles", kinds * 16, indirect)?;
+        let arguments = gpu.buffer("arguments", 32, indirect)?;
+        let large = gpu.buffer("large points", MOST_LARGE * 8 + 16, indirect)?;
+        let tiles = instances::tiles(&scene.trees);
+        // A tile may lie in every band.
+        let list = (size_of::<[[u32; 4]; MOST_BANDS]>() + MOST_BANDS * tiles.len() * 8) as u64;
+        let tile_list = gpu.buffer("tiles", list, storage)?;
+
+        let light = scene.file.sun.light();
+        let [sun, sky] = opacity_maps(scene, &blocks)?;
+        let sun_map = table("light of the sun", bytemuck::cast_slice(&sun.texels))?;
+        let sky_map = table("light of the sky", bytemuck::cast_slice(&sky.texels))?;
+        let uniform = |what, size| gpu.buffer(what, size as u64, BufferUsages::UNIFORM);
+        let frame = uniform("frame", size_of::<FrameUniform>())?;
+        let land = uniform("land", size_of::<LandUniform>())?;
+        let layouts = &renderer.layouts;
+        fn whole(b: &Buffer) -> BindingResource<'_> {
+            b.as_entire_binding()
+        }
+        let group = |label, layout, all: &[&Buffer]| {
+            let all: Vec<BindingResource> = all.iter().map(|b| whole(b)).collect();
+            bind::group(&gpu.device, label, layout, &all)
+        };
+        let land_group = group("land", &layouts.land, &[&frame, &land, &sun_map, &sky_map]);
+
+        let ground = Ground::new(&scene.land);
+        let vertices = ground_vertices(&scene.land, &scene.file.land);
+        let vertices = table("points of the ground", bytemuck::cast_slice(&vertices))?;
+        let most = scene.land.points.map(|n| u64::from((n - 1).div_ceil(PATCH)));
+        let patches = gpu.buffer("patches", most[0] * most[1] * 16, storage)?;
+        let grid = uniform("grid", size_of::<GridUniform>())?;
+        let cell = scene.land.cell().map(|v| v as f32);
+        let points_across = GridUniform { points: scene.land.points, cell };
+        gpu.queue.write_buffer(&grid, 0, bytemuck::bytes_of(&points_across));
+        let ground_group = group("ground", &layouts.ground, &[&patches, &vertices, &grid]);
+
+        let mut triangles = Vec::new();
+        for (i, (species, block)) in (0..).zip(scene.species.iter().zip(&blocks)) {
+            let runs = BindingResource::Buffer(BufferBinding {
+                buffer: &runs,
+                offset: i * runs_each,
+                size: BufferSize::new(runs_each),
+            });
+            let layout = &layouts.triangles;
+            triangles.push(match block.triangles.is_empty() {
+                true => None,
+                false => Some(TrianglesModel::load(
+                    gpu,
+                    layout,
+                    &species.pack,
+                    block,
+                    &cells,
+                    Some(runs),
+                )?),
+            });
+        }
+        let counted = gpu.device.create_buffer(&BufferDescriptor {
+            label: Some("counted"),
+            size: WORK_HEAD as u64 * 4,
+            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let steps_group = group("steps", &layouts.steps, &[&work, &arguments]);
+        let large_group = group("large points", &layouts.large, &[&points, &cells, &radii, &large]);
+        let stances = scene.stances();
+        let choose = [&points, &tile_list, &radii, &trees, &species, &stocks, &work, &cells]
+            .into_iter()
+            .chain([&chunks, &prefixes, &sizes, &runs, &draws])
+            .cloned()
+            .collect();
+        let splat = [&points, &cells, &radii, &chunks, &large, &work].map(Buffer::clone).into();
+        let all = [&points, &cells, &radii, &trees, &species, &stocks, &work, &chunks, &prefixes]
+            .into_iter()
+            .chain([&sizes, &runs, &draws, &large, &tile_list, &sun_map, &sky_map, &vertices])
+            .chain([&patches]);
+        let bytes = all.map(Buffer::size).sum::<u64>()
+            + triangles.iter().flatten().map(|t| t.bytes()).sum::<u64>();
+        gpu.finish()?;
+        Ok(Self {
+            scene,
+            ground,
+            tiles,
+            reach: stances.iter().map(|s| s.reach() * s.scale[1]).collect(),
+            maps: [&sun, &sky].map(LightMapUniform::new),
+            light,
+            frame,
+            land,
+            land_group,
+            patches,
+            ground_group,
+            tile_list,
+            work,
+            arguments,
+            steps_group,
+            draws,
+            large,
+            large_group,
+            triangles,
+            counted,
+            choose,
+            splat,
+            bands: Bands::default(),
+            patch_count: 0,
+            bytes,
+        })
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &'s Scene {
+        self.scene
+    }
+
+    /// Bytes that it takes on the device, without targets.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// What the last frame took; waits for it.
+    ///
+    /// # Errors
+    /// When the device failed.
+    pub fn drawn(&self, gpu: &Gpu) -> Result<LandscapeDrawn, GpuError> {
+        let bytes = crate::timer::read(gpu, &self.counted)?;
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+        let ground = u64::from(self.patch_count * 2 * PATCH * PATCH);
+        let [trees, points, triangles, left_out] = [4, 5, 6, 7].map(|i| u64::from(words[i]));
+        let looked_at = self.bands.trees;
+        Ok(LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out })
+    }
+
+    /// Chooses tiles and patches, and uploads what a frame needs.
+    pub(crate) fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        camera: &forest_soup::Camera,
+        detail: &crate::landscape::LandscapeDetail,
+        side: u32,
+        bands: usize,
+    ) {
+        let samples = crate::frame::supersampled(camera, side);
+        let frame = FrameUniform::of_land(&samples, &self.light);
+        let land = LandUniform::new(self.maps, camera, detail, &self.scene.file.sky, side);
+        let queue = &gpu.queue;
+        queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        queue.write_buffer(&self.land, 0, bytemuck::bytes_of(&land));
+        self.bands.fill(&self.tiles, &self.reach, camera, bands);
+        let head: &[u8] = bytemuck::cast_slice(&self.bands.firsts);
+        queue.write_buffer(&self.tile_list, 0, head);
+        let list = bytemuck::cast_slice(&self.bands.tiles);
+        queue.write_buffer(&self.tile_list, head.len() as u64, list);
+        let patches = self.ground.select(&self.scene.land, camera, detail.ground);
+        self.patch_count = patches.len() as u32;
+        let record = |p: Patch| PatchRecord { corner: p.corner, stride: p.stride, skirt: p.skirt };
+        let patches: Vec<PatchRecord> = patches.into_iter().map(record).collect();
+        queue.write_buffer(&self.patches, 0, bytemuck::cast_slice(&patches));
+        queue.write_buffer(&self.work, 0, bytemuck::cast_slice(&[0u32; WORK_HEAD]));
+        let draw = [3 * RUN_TRIANGLES, 0, 0, 0];
+        let draws: Vec<[u32; 4]> = vec![draw; self.triangles.len()];
+        queue.write_buffer(&self.draws, 0, bytemuck::cast_slice(&draws));
+        // Four corners, no instance yet.
+        queue.write_buffer(&self.large, 0, bytemuck::cast_slice(&[4u32, 0, 0, 0]));
+    }
+}
+
+/// The opacity maps along the sun, and from above.
+fn opacity_maps(
+    scene: &Scene,
+    blocks: &[forest_points::PointsBlock],
+) -> Result<[OpacityMap; 2], GpuError> {
+    let to_sun = match scene.file.sun.light() {
+        Light::Sun(sun) => sun.to_sun,
+        Light::Albedo => DVec3::Y,
+    };
+    let wide = scene.land.size[0].max(scene.land.size[1]);
+    let texel = MAP_TEXEL.max(wide / f64::from(MAP_SIDE));
+    let stances = scene.stances();
+    let canopy = |(block, stance): (&forest_points::PointsBlock, &Stance)| {
+        let [min, max] = stance.bounds;
+        let texels = (max - min).max_element() / texel;
+        let most = (4.0 * texels * texels).clamp(*CANOPY.start(), *CANOPY.end());
+        Canopy::new(block, stance, most as u64)
+    };
+    let canopies: Vec<Canopy> = blocks.iter().zip(&stances).map(canopy).collect();
+    let casters = Casters { trees: &scene.trees, stances: &stances, canopies: &canopies };
+    let map = |light| OpacityMap::new(&scene.land, &casters, light, texel, 2 * MAP_SIDE);
+    Ok([map(to_sun), map(DVec3::Y)])
+}
+
+const _: () = assert!(size_of::<CellUniform>() == 64);

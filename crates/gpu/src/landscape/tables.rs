@@ -1,0 +1,145 @@
+//! What shaders know of the species: one table of each thing for all of them.
+
+use crate::error::GpuError;
+use bytemuck::{Pod, Zeroable};
+use forest_points::{CellRecord, Order, PointsBlock, SizeCode};
+use forest_scene::{Canopy, Species, Stance};
+use glam::DVec3;
+
+/// `Species` of trees.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SpeciesRecord {
+    center: [f32; 3],
+    radius: f32,
+    origin: [f32; 3],
+    block_unit: f32,
+    least: f32,
+    step: f32,
+    first_cell: u32,
+    cells: u32,
+    first_code: u32,
+    root_parent: i32,
+    has_triangles: u32,
+    unit: f32,
+    first_triangle: u32,
+    triangle_number: u32,
+    pub(crate) first_run: u32,
+    pub(crate) runs: u32,
+    depth: f32,
+    zero: [u32; 3],
+}
+
+/// `Stock` of trees.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct StockRecord {
+    origin: [f32; 3],
+    step: f32,
+    center: [f32; 3],
+    radius: f32,
+    first_point: u32,
+    points: u32,
+    number: u32,
+    root_parent: i32,
+    first_triangle: u32,
+    triangles: u32,
+    is_top: u32,
+    triangle_number: u32,
+}
+
+/// The tables of all species. Points are uploaded from their memory maps.
+#[derive(Debug, Default)]
+pub(crate) struct Tables {
+    pub(crate) species: Vec<SpeciesRecord>,
+    pub(crate) stocks: Vec<StockRecord>,
+    pub(crate) radii: Vec<f32>,
+    pub(crate) prefixes: Vec<u32>,
+    pub(crate) triangle_sizes: Vec<u32>,
+    points: u32,
+}
+
+/// Size codes there are, [`SizeCode::INFINITE`] among them.
+const CODES: u32 = 4096;
+
+/// Points that the optical depth of a tree is taken from.
+const CANOPY_POINTS: u64 = 256;
+
+/// Steps of an instance's scale.
+const SCALE_STEPS: f64 = 4095.0;
+
+impl Tables {
+    /// Adds a species, whose points come after those of the ones before.
+    ///
+    /// # Errors
+    /// When the pack is in the paper's order, which has no valid cut.
+    pub(crate) fn add(&mut self, species: &Species, block: &PointsBlock) -> Result<(), GpuError> {
+        if block.header.order != Order::Exact {
+            let pack = species.pack.path().display().to_string();
+            return Err(GpuError::Missing { pack, what: "points in the exact order".into() });
+        }
+        let stance = &species.stance;
+        let from_foot = |world: DVec3| (world - stance.anchor) * stance.unit;
+        let [min, max] = stance.bounds;
+        let first_code = self.radii.len() as u32;
+        let first_triangle = self.triangle_sizes.len() as u32;
+        let first_cell = self.stocks.len() as u32;
+        let unit = stance.unit;
+        for cell in block.cells {
+            self.stocks.push(stock(block, cell, stance, self.points));
+        }
+        // The block's own tree is the last cell.
+        let top = block.cells.last().map_or(&[][..], |c| block.cell_points(c));
+        let radius = |code| (block.radius_of(code) * block.scale()) as f32;
+        self.radii.extend((0..CODES as u16).filter_map(SizeCode::from_bits).map(radius));
+        self.prefixes.extend(
+            (0..CODES)
+                .map(|fine| top.partition_point(|p| u32::from(p.parent().bits()) > fine) as u32),
+        );
+        self.triangle_sizes.extend(block.triangles.iter().map(|t| u32::from(t.size)));
+        let below = block.cells.iter().filter(|c| !c.is_top());
+        self.species.push(SpeciesRecord {
+            center: ((min + max) * 0.5).as_vec3().to_array(),
+            radius: ((max - min).length() * 0.5) as f32,
+            origin: from_foot(block.origin()).as_vec3().to_array(),
+            block_unit: (block.scale() * unit) as f32,
+            least: stance.scale[0] as f32,
+            step: ((stance.scale[1] - stance.scale[0]) / SCALE_STEPS) as f32,
+            first_cell,
+            cells: block.cells.len() as u32,
+            first_code,
+            root_parent: below.map(|c| i32::from(c.root_parent)).max().unwrap_or(-1),
+            has_triangles: (!block.triangles.is_empty()).into(),
+            unit: unit as f32,
+            first_triangle,
+            triangle_number: 0,
+            first_run: 0,
+            runs: 0,
+            depth: Canopy::new(block, stance, CANOPY_POINTS).depth(stance) as f32,
+            zero: [0; 3],
+        });
+        self.points += block.points.len() as u32;
+        Ok(())
+    }
+}
+
+fn stock(block: &PointsBlock, cell: &CellRecord, stance: &Stance, first: u32) -> StockRecord {
+    let from_foot = |world: DVec3| ((world - stance.anchor) * stance.unit).as_vec3().to_array();
+    let center = DVec3::from_array(cell.center.map(f64::from));
+    let metres = block.scale() * stance.unit;
+    StockRecord {
+        origin: from_foot(block.to_world(block.position(cell, [0; 3]))),
+        step: (block.step(cell) * metres) as f32,
+        center: from_foot(block.to_world(center)),
+        radius: (f64::from(cell.radius) * metres) as f32,
+        first_point: cell.first_point + first,
+        points: cell.points,
+        // Numbers are those of the block alone, whatever was uploaded before it.
+        number: first.wrapping_neg(),
+        root_parent: cell.root_parent.into(),
+        first_triangle: cell.first_triangle,
+        triangles: cell.triangles,
+        is_top: cell.is_top().into(),
+        triangle_number: block.points.len() as u32,
+    }
+}

@@ -1,0 +1,191 @@
+// What the shaders of a forest share: its tables, and what may be left out of a picture.
+
+struct Species {
+    // Ball about a tree, from its foot, at scale 1.
+    center: vec3f,
+    radius: f32,
+    // Zero of its block, from its foot.
+    origin: vec3f,
+    // Metres of a block unit.
+    block_unit: f32,
+    // Least scale, and what is added for each step of it.
+    least: f32,
+    step: f32,
+    // Its cells; the last one is the block's own tree.
+    first_cell: u32,
+    cells: u32,
+    // Its size codes in `prefixes`, and its radii.
+    first_code: u32,
+    // Largest size code of a cell root's parent: from there on the block's own tree is all there is.
+    root_parent: i32,
+    // 1 if there are triangles.
+    has_triangles: u32,
+    // Metres of a unit of radii.
+    unit: f32,
+    // Its triangles in `triangle_sizes`, and the number of the first one for the hash rule.
+    first_triangle: u32,
+    triangle_number: u32,
+    // Its runs of triangles, and how many there is room for.
+    first_run: u32,
+    runs: u32,
+    // Mean optical depth through the whole tree.
+    depth: f32,
+    zero0: u32,
+    zero1: u32,
+    zero2: u32,
+}
+
+// A cell of a species, in metres from the foot of a tree of scale 1.
+struct Stock {
+    origin: vec3f,
+    step: f32,
+    center: vec3f,
+    radius: f32,
+    first_point: u32,
+    points: u32,
+    // What is added to indices of points for their numbers.
+    number: u32,
+    root_parent: i32,
+    // In the species' own array.
+    first_triangle: u32,
+    triangles: u32,
+    is_top: u32,
+    // What is added to indices of triangles for their numbers.
+    triangle_number: u32,
+}
+
+// A tree as it stands before the eye.
+struct Tree {
+    species: u32,
+    // Its foot from the eye.
+    foot: vec3f,
+    turn: vec2f,
+    scale: f32,
+    mask: u32,
+}
+
+struct Work {
+    // Which part of the tiles is looked at.
+    band: u32,
+    near: atomic<u32>,
+    chunks: atomic<u32>,
+    cells: atomic<u32>,
+    // Counted for people: trees drawn, points and triangles looked at, and what found no room.
+    trees: atomic<u32>,
+    points: atomic<u32>,
+    triangles: atomic<u32>,
+    left_out: atomic<u32>,
+    // Trees whose cells are chosen one by one, and largest size codes of their blocks' own trees.
+    trees_near: array<vec2u>,
+}
+
+@group(1) @binding(3) var<storage, read> instances: array<vec4u>;
+@group(1) @binding(4) var<storage, read> species_table: array<Species>;
+@group(1) @binding(5) var<storage, read> stocks: array<Stock>;
+@group(1) @binding(6) var<storage, read_write> work: Work;
+@group(1) @binding(7) var<storage, read_write> cells_out: array<Cell>;
+@group(1) @binding(8) var<storage, read_write> chunks_out: array<Chunk>;
+@group(1) @binding(9) var<storage, read> nearness: Nearness;
+
+fn tree_of(index: u32) -> Tree {
+    let record = instances[index];
+    var t: Tree;
+    t.species = record.w >> 24u;
+    let s = species_table[t.species];
+    t.scale = s.least + s.step * f32((record.w >> 12u) & 0xfffu);
+    let yaw = f32(record.w & 0xfffu) * (6.283185307179586 / 4096.0);
+    t.turn = vec2f(cos(yaw), sin(yaw));
+    t.foot = from_eye(bitcast<vec3f>(record.xyz));
+    // Two trees do not share the samples that they cover.
+    t.mask = mix_bits(index + 1u);
+    return t;
+}
+
+fn place_of(t: Tree, off: vec3f) -> vec3f {
+    return t.foot + turned(t.turn, off) * t.scale;
+}
+
+// Whether a ball is behind the eye, or all of it beside the picture.
+fn is_beside(center: vec3f, radius: f32) -> bool {
+    let depth = dot(center, frame.forward);
+    let half = 0.5 * frame.size / frame.scale;
+    let off = abs(vec2f(dot(center, frame.right), dot(center, frame.down)));
+    let reach = radius * sqrt(1.0 + half * half);
+    return depth < -radius || any(off > half * depth + reach);
+}
+
+// Estimated share of a ball that is not behind what nearer bands drew; 0 if it surely is.
+fn ball_open(center: vec3f, radius: f32) -> f32 {
+    let depth = dot(center, frame.forward) - radius;
+    if depth <= frame.near {
+        return 1.0;
+    }
+    let scale = frame.scale / depth;
+    let reach = radius * scale;
+    let at = 0.5 * frame.size
+        + vec2f(dot(center, frame.right), dot(center, frame.down)) * (frame.scale / (depth + radius));
+    // The picture of the ball's middle is that of its depth; of its nearest part it is farther out.
+    let stretch = abs(at - 0.5 * frame.size) * (radius / depth);
+    let low = clamp(at - reach - stretch, vec2f(0.0), frame.size - 1.0);
+    let high = clamp(at + reach + stretch, vec2f(0.0), frame.size - 1.0);
+    if is_covered(vec2u(low), vec2u(high), depth_value(depth)) {
+        return 0.0;
+    }
+    return open_share(vec2u(low), vec2u(high), depth_value(depth + radius));
+}
+
+// What thresholds are raised by where only a share is seen. The error that is seen is the share times
+// that of the points, which grows about as the root of their area, and their number falls with it:
+// the sum of errors for a number of points is least if area grows as the share to the power −2/3.
+fn coarser(share: f32) -> f32 {
+    return pow(max(share, LEAST_SHARE), -land.hidden);
+}
+
+// The largest size code whose area is at most `area` of square block units; −1 for none:
+// forest_points::SizeCode::at_most.
+fn code_at_most(area: f32) -> i32 {
+    let position = 4095.0 - (SIZE_TOP - log2(area)) * SIZES_PER_OCTAVE;
+    return i32(clamp(floor(position), -1.0, 4094.0));
+}
+
+// Pixels of a block unit at a distance.
+fn pixels(t: Tree, block_unit: f32, distance: f32) -> f32 {
+    return frame.scale / distance * block_unit * t.scale;
+}
+
+// The cell of a tree as it is drawn; -1 if there is no room.
+fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32) -> i32 {
+    let slot = atomicAdd(&work.cells, 1u);
+    if slot >= arrayLength(&cells_out) {
+        atomicAdd(&work.left_out, 1u);
+        return -1;
+    }
+    cells_out[slot] = Cell(
+        place_of(t, stock.origin),
+        stock.step * t.scale,
+        fine,
+        coarse,
+        vec2f(0.0, 1.0),
+        t.turn,
+        s.unit * t.scale,
+        s.first_code,
+        stock.number,
+        stock.triangle_number,
+        t.mask,
+        0u,
+    );
+    return i32(slot);
+}
+
+fn put_points(cell: u32, first: u32, count: u32) {
+    let chunks = (count + CHUNK - 1u) / CHUNK;
+    let slot = atomicAdd(&work.chunks, chunks);
+    for (var k = 0u; k < chunks; k++) {
+        if slot + k >= arrayLength(&chunks_out) {
+            atomicAdd(&work.left_out, 1u);
+            return;
+        }
+        let skip = k * CHUNK;
+        chunks_out[slot + k] = Chunk(cell, first + skip, min(CHUNK, count - skip), 0u);
+    }
+}
