@@ -49,7 +49,7 @@ pub(crate) struct CellUniform {
     first_point: u32,
     first_triangle: u32,
     mask: u32,
-    zero: u32,
+    clump: f32,
 }
 
 /// `Chunk` of chunk.wgsl.
@@ -236,7 +236,7 @@ fn cell_uniform(block: &PointsBlock, cell: &CellRecord, camera: &Camera) -> Cell
         // Points and triangles have different numbers for the hash rule.
         first_triangle: block.points.len() as u32,
         mask: 0,
-        zero: 0,
+        clump: 0.0,
     }
 }
 

@@ -137,6 +137,7 @@ fn constants() -> String {
         ("MOST_LEVELS", crate::volume::MOST_LEVELS as u32),
     ];
     let floats = [
+        ("DIFFUSE", forest_scene::DIFFUSE),
         ("DEPTH_STEPS", f64::from(forest_scene::DEPTH_STEPS)),
         ("LEAST_SHARE", landscape::LEAST_SHARE),
         ("SIZE_TOP", SizeCode::LOG2_TOP),

@@ -49,7 +49,7 @@ pub use instances::{Instance, MOST_SPECIES, TILE, Tile};
 pub use land::{Land, MOST_POINTS};
 pub use scatter::{MOST_TREES, Scatter};
 pub use scene::{Scene, open_land, plant, read_file, write_file};
-pub use shade::{Casters, DEPTH_STEPS, LOWEST_LIGHT, OpacityMap, Texel};
+pub use shade::{Casters, DEPTH_STEPS, DIFFUSE, LOWEST_LIGHT, OpacityMap, Texel};
 pub use sight::{Sight, Sky};
 pub use species::{Canopy, CanopyPoint, Species, Stance};
 pub use surface::{GroundVertex, ground_soup, ground_vertices};

@@ -1,8 +1,8 @@
 //! How much light reaches a place between the trees: a terrain-aligned opacity map.
 //!
 //! The land is looked at along the light. Each texel of the ground plane (y = 0, where light rays meet
-//! it) keeps the slab of heights in which its rays meet trees, and their optical depth; between
-//! the slab's top and its bottom the light fades evenly. Made once for a light, looked up by every
+//! it) keeps the optical depth of the trees that its rays meet, and the slab of heights that has the mean
+//! and the variance of what they meet; between the slab's top and its bottom the light fades. Made once for a light, looked up by every
 //! point and pixel; in the manner of deep opacity maps (C. Yuksel, J. Keyser, "Deep opacity maps",
 //! 2008), with one layer. Hills cast no shadow.
 
@@ -14,6 +14,10 @@ use rayon::prelude::*;
 
 /// Steps of stored optical depth for a depth of 1.
 pub const DEPTH_STEPS: f32 = 1024.0;
+
+/// Light from the whole sky goes, in the mean, so many times as far through a layer as light from
+/// straight above: the diffusivity factor (W. M. Elsasser 1942).
+pub const DIFFUSE: f64 = 1.66;
 
 /// Lights are taken for at least this high above the horizon (sine of the elevation).
 pub const LOWEST_LIGHT: f64 = 0.1;
@@ -129,11 +133,12 @@ impl OpacityMap {
                 [px + off.x * cos + off.z * sin, py + off.y, pz - off.x * sin + off.z * cos];
             let at = self.on_plane(DVec3::new(x.into(), y.into(), z.into()));
             let radius = p.radius * scale;
-            // The square of the disc's area, as wide as a texel at least.
+            // The square of the disc's area, as wide as a texel at least. A ball has a fifth of its squared
+            // radius for variance.
             let half = (radius * 0.886).max(0.5 * self.texel as f32) / self.texel as f32;
             let [u, v] = std::array::from_fn(|k| ((at[k] - self.corner[k]) / self.texel) as f32);
             let depth = p.thickness * scale * scale / spread;
-            strip.add([u, v], half, depth, [y + radius, y - radius]);
+            strip.add([u, v], half, depth, [y, 0.2 * radius * radius]);
         }
     }
 
@@ -178,24 +183,25 @@ fn raised(to_light: DVec3) -> DVec3 {
 /// Rows of the map in the making.
 struct Strip {
     width: usize,
-    first: usize,
+    row: usize,
     depth: Vec<f32>,
-    top: Vec<f32>,
-    bottom: Vec<f32>,
+    /// Sums of heights above the first one met, and of their squares, weighted by depth.
+    first: Vec<f32>,
+    sums: Vec<[f32; 2]>,
 }
 
 impl Strip {
-    fn new(width: usize, first: usize, rows: usize) -> Self {
+    fn new(width: usize, row: usize, rows: usize) -> Self {
         let n = width * rows;
-        let (top, bottom) = (vec![f32::NEG_INFINITY; n], vec![f32::INFINITY; n]);
-        Self { width, first, depth: vec![0.0; n], top, bottom }
+        Self { width, row, depth: vec![0.0; n], first: vec![0.0; n], sums: vec![[0.0; 2]; n] }
     }
 
-    /// Spreads `depth` (times a texel's area) over the square of half width `half` about `at`.
-    fn add(&mut self, at: [f32; 2], half: f32, depth: f32, [top, bottom]: [f32; 2]) {
+    /// Spreads `depth` (times a texel's area), of this mean height and variance, over the square of half
+    /// width `half` about `at`.
+    fn add(&mut self, at: [f32; 2], half: f32, depth: f32, [height, variance]: [f32; 2]) {
         let rows = self.depth.len() / self.width;
         let share = 1.0 / (4.0 * half * half);
-        let v = at[1] - self.first as f32;
+        let v = at[1] - self.row as f32;
         let clip = |from: f32, n: usize| (from.max(0.0) as usize).min(n);
         let overlap = |k: usize, middle: f32| {
             let k = k as f32;
@@ -206,9 +212,13 @@ impl Strip {
                 let part = overlap(i, at[0]) * overlap(j, v) * share;
                 if part > 0.0 {
                     let t = j * self.width + i;
-                    self.depth[t] += depth * part;
-                    self.top[t] = self.top[t].max(top);
-                    self.bottom[t] = self.bottom[t].min(bottom);
+                    if self.depth[t] == 0.0 {
+                        self.first[t] = height;
+                    }
+                    let (d, h) = (depth * part, height - self.first[t]);
+                    self.depth[t] += d;
+                    self.sums[t][0] += d * h;
+                    self.sums[t][1] += d * (h * h + variance);
                 }
             }
         }
@@ -219,7 +229,14 @@ impl Strip {
         let code = |h: f32| ((f64::from(h) - low) / (high - low) * HEIGHT_STEPS).round() as u16;
         let depth = |d: f32| (d * DEPTH_STEPS).round() as u16;
         let texel = |i: usize| match self.depth[i] > 0.0 {
-            true => [code(self.top[i]), code(self.bottom[i]), depth(self.depth[i]).max(1), 0],
+            true => {
+                let [mean, square] = self.sums[i].map(|s| s / self.depth[i]);
+                // An even slab's variance is a twelfth of its squared thickness.
+                let half = (3.0 * (square - mean * mean).max(0.0)).sqrt();
+                let middle = self.first[i] + mean;
+                let [top, bottom] = [middle + half, middle - half].map(code);
+                [top, bottom, depth(self.depth[i]).max(1), 0]
+            }
             false => [0; 4],
         };
         (0..self.depth.len()).map(texel).collect()
@@ -238,7 +255,7 @@ mod tests {
 
     /// One tree in the middle: a ball of radius 4 m, 10 m above the ground, of thickness 40 m².
     fn map(to_light: DVec3) -> OpacityMap {
-        let points = vec![CanopyPoint { off: Vec3::Y * 10.0, radius: 4.0, thickness: 40.0 }];
+        let points = vec![CanopyPoint { off: Vec3::Y * 10.0, radius: 4.0, thickness: 40.0, depth: 1.0 }];
         let bounds = [DVec3::new(-4.0, 0.0, -4.0), DVec3::new(4.0, 14.0, 4.0)];
         let stance = Stance { anchor: DVec3::ZERO, unit: 1.0, scale: [1.0, 1.0], bounds };
         let casters = Casters {
@@ -256,7 +273,9 @@ mod tests {
         let depth = 40.0 / (4.0 * 3.544f32 * 3.544);
         let at = |y: f64| map.seen(DVec3::new(0.0, y, 0.0));
         assert_eq!(at(20.0), 1.0);
-        for (y, share) in [(14.0, 0.0f32), (10.0, 0.5), (6.0, 1.0), (0.0, 1.0)] {
+        // The slab with a ball's variance is 2·√0.6 radii thick.
+        let half = 4.0 * 0.6f64.sqrt();
+        for (y, share) in [(10.0 + half, 0.0f32), (10.0, 0.5), (10.0 - half, 1.0), (0.0, 1.0)] {
             assert!((at(y) - (-depth * share).exp()).abs() < 2e-3, "{y}: {}", at(y));
         }
         assert_eq!(map.seen(DVec3::new(9.0, 0.0, 0.0)), 1.0);

@@ -66,6 +66,8 @@ pub struct CanopyPoint {
     /// Optical depth times the area it is spread over, in square metres: −ln(1 − opacity) times the
     /// mean projected area.
     pub thickness: f32,
+    /// Optical depth through it: −ln(1 − opacity).
+    pub depth: f32,
 }
 
 /// What is behind more than this is not told apart from what is behind all.
@@ -97,13 +99,25 @@ impl Canopy {
             let radius = block.radius(p) * block.scale() * stance.unit;
             let opacity = p.opacity().min(MOST_OPACITY);
             let area = spheroid::mean_projected_area(radius, p.flatness_step(), 1.0);
+            let depth = -(1.0 - opacity).ln();
             CanopyPoint {
                 off: ((place - stance.anchor) * stance.unit).as_vec3(),
                 radius: radius as f32,
-                thickness: (-(1.0 - opacity).ln() * area) as f32,
+                thickness: (depth * area) as f32,
+                depth: depth as f32,
             }
         });
         Self { points: points.collect() }
+    }
+
+    /// Optical depth that a leaf has before it on the mean within its own point: light falls on a layer
+    /// of depth t by the mean of e^−x for x from 0 to t. What a map of larger texels cannot show.
+    pub fn clump(&self) -> f64 {
+        let part = |t: f64| if t > 1e-6 { (1.0 - (-t).exp()) / t } else { 1.0 };
+        let weight = |p: &CanopyPoint| f64::from(p.thickness);
+        let all: f64 = self.points.iter().map(weight).sum();
+        let lit: f64 = self.points.iter().map(|p| weight(p) * part(p.depth.into())).sum();
+        if all > 0.0 { -(lit / all).ln() } else { 0.0 }
     }
 
     /// Mean optical depth on the way through the whole tree: its thickness over the area of the ellipse

@@ -27,7 +27,8 @@ pub(crate) struct SpeciesRecord {
     pub(crate) first_run: u32,
     pub(crate) runs: u32,
     depth: f32,
-    zero: [u32; 3],
+    clump: f32,
+    zero: [u32; 2],
 }
 
 /// `Stock` of trees.wgsl.
@@ -97,6 +98,7 @@ impl Tables {
                 .map(|fine| top.partition_point(|p| u32::from(p.parent().bits()) > fine) as u32),
         );
         self.triangle_sizes.extend(block.triangles.iter().map(|t| u32::from(t.size)));
+        let canopy = Canopy::new(block, stance, CANOPY_POINTS);
         let below = block.cells.iter().filter(|c| !c.is_top());
         self.species.push(SpeciesRecord {
             center: ((min + max) * 0.5).as_vec3().to_array(),
@@ -115,8 +117,9 @@ impl Tables {
             triangle_number: 0,
             first_run: 0,
             runs: 0,
-            depth: Canopy::new(block, stance, CANOPY_POINTS).depth(stance) as f32,
-            zero: [0; 3],
+            depth: canopy.depth(stance) as f32,
+            clump: canopy.clump() as f32,
+            zero: [0; 2],
         });
         self.points += block.points.len() as u32;
         Ok(())

@@ -19,7 +19,8 @@ struct Cell {
     first_point: u32,
     first_triangle: u32,
     mask: u32,
-    zero: u32,
+    // Optical depth before each leaf, for all light.
+    clump: f32,
 }
 
 // A vector of the block in the world.

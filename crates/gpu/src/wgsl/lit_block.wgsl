@@ -7,6 +7,11 @@ fn sun_seen(place: vec3f) -> f32 {
     return 1.0 - 0.5 * (z + 1.0) * (1.0 - frame.darkest);
 }
 
+// Share of the sky that a surface is turned to: a block alone has no ground.
+fn skyward(normal: vec3f) -> f32 {
+    return 1.0;
+}
+
 // Shares of the sun and of the sky that are seen at a place from the eye.
 fn seen_at(place: vec3f) -> vec2f {
     return vec2f(sun_seen(place), 1.0);

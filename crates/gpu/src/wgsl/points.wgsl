@@ -57,11 +57,11 @@ fn contains(e: Ellipse, at: vec2f) -> bool {
 }
 
 // Lit colour of a point that is turned by `turn` and is seen at `at` in depth `depth`.
-fn point_color(turn: vec2f, p: vec4u, at: vec2f, depth: f32) -> vec4f {
+fn point_color(turn: vec2f, clump: f32, p: vec4u, at: vec2f, depth: f32) -> vec4f {
     let rgb = srgb_to_linear(vec3f(vec3u(p.z & 0xffu, (p.z >> 8u) & 0xffu, (p.z >> 16u) & 0xffu)) / 255.0);
     let place = unproject(at, depth);
     let axis = point_axis(turn, p);
     let normal = select(axis, -axis, dot(axis, to_eye(place)) < 0.0);
-    let seen = seen_at(place);
-    return vec4f(rgb * light(normal, seen.x, seen.y), 1.0);
+    let seen = seen_at(place) * exp(-clump);
+    return vec4f(rgb * light(normal, seen.x, seen.y * skyward(normal)), 1.0);
 }

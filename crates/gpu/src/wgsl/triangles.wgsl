@@ -79,7 +79,7 @@ fn corner(index: u32, cell_index: u32) -> Corner {
         let c = unpack4x8unorm(colors[index]);
         out.tint = vec4f(srgb_to_linear(c.rgb), c.a);
     }
-    out.seen = seen_at(place);
+    out.seen = seen_at(place) * exp(-cell.clump);
     out.what = vec3u(triangle, material, cell_index);
     return out;
 }
@@ -143,6 +143,6 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
     if (m.flags & 1u) != 0u {
         return vec4f(rgb, 1.0);
     }
-    let toward = select(-in.normal, in.normal, front);
-    return vec4f(rgb * light(normalize(toward), in.seen.x, in.seen.y), 1.0);
+    let normal = normalize(select(-in.normal, in.normal, front));
+    return vec4f(rgb * light(normal, in.seen.x, in.seen.y * skyward(normal)), 1.0);
 }

@@ -106,7 +106,7 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32) {
         stock.number,
         0u,
         t.mask,
-        0u,
+        s.clump,
     );
     for (var k = 0u; k < count; k++) {
         let index = stock.first_point + k;
@@ -133,7 +133,7 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32) {
         if e.opacity == 0u || box.x > box.z || box.y > box.w {
             continue;
         }
-        let color = point_color(cell.turn, p, e.center, e.depth).rgb;
+        let color = point_color(cell.turn, cell.clump, p, e.center, e.depth).rgb;
     splat_box(e, point_number(cell, index), cell.fade, box, pack_color(color));
     }
 }

@@ -60,6 +60,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
 
 @fragment
 fn fragment(in: Corner) -> @location(0) vec4f {
+    let normal = normalize(in.normal);
     let seen = seen_smoothly(in.place);
-    return vec4f(in.color * light(normalize(in.normal), seen.x, seen.y), 1.0);
+    return vec4f(in.color * light(normal, seen.x, seen.y * skyward(normal)), 1.0);
 }

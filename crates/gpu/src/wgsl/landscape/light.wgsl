@@ -81,6 +81,11 @@ fn sky_depth(at: vec2i, y: f32) -> f32 {
     return depth_above(sky_map[u32(at.y) * land.sky.size.x + u32(at.x)], y);
 }
 
+// Share of the sky, weighted by cosines, that a surface is turned to; the rest is ground.
+fn skyward(normal: vec3f) -> f32 {
+    return 0.5 + 0.5 * normal.y;
+}
+
 // Shares of the sun and of the sky that are seen at a place from the eye, of the texels around it.
 fn seen_smoothly(off: vec3f) -> vec2f {
     let place = off + land.eye;
@@ -97,7 +102,7 @@ fn seen_smoothly(off: vec3f) -> vec2f {
         mix(sky_depth(b.at + i.yx, b.y), sky_depth(b.at + i.xx, b.y), b.part.x),
         b.part.y,
     );
-    return exp(-vec2f(sun, sky));
+    return exp(-vec2f(sun, DIFFUSE * sky));
 }
 
 // The same of the nearest texels: points are many.
@@ -107,7 +112,7 @@ fn seen_at(off: vec3f) -> vec2f {
     let b = map_place(land.sky, place);
     return exp(-vec2f(
         sun_depth(a.at + vec2i(a.part + 0.5), a.y),
-        sky_depth(b.at + vec2i(b.part + 0.5), b.y),
+        DIFFUSE * sky_depth(b.at + vec2i(b.part + 0.5), b.y),
     ));
 }
 

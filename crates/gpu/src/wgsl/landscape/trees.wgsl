@@ -30,9 +30,10 @@ struct Species {
     runs: u32,
     // Mean optical depth through the whole tree.
     depth: f32,
+    // Optical depth that a leaf has before it within its own clump.
+    clump: f32,
     zero0: u32,
     zero1: u32,
-    zero2: u32,
 }
 
 // A cell of a species, in metres from the foot of a tree of scale 1.
@@ -172,7 +173,7 @@ fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32) -> i32 {
         stock.number,
         stock.triangle_number,
         t.mask,
-        0u,
+        s.clump,
     );
     return i32(slot);
 }

@@ -1,0 +1,92 @@
+//! Parts of pictures of a landscape, by rays through all its trees.
+
+use forest_raster::{Grove, Kind, Picture, Planted, Sampling, Style, Surfaces};
+use forest_scene::{Scene, Sky, ground_soup, ground_vertices};
+use forest_soup::{Camera, TriangleSoup};
+use glam::DVec3;
+
+/// A part of a picture: first pixel and size.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crop {
+    pub(crate) corner: [u32; 2],
+    pub(crate) size: [u32; 2],
+}
+
+/// The soups of a scene's species, ready for rays.
+pub(crate) struct Sources {
+    soups: Vec<TriangleSoup>,
+    surfaces: Vec<Surfaces>,
+}
+
+impl Sources {
+    pub(crate) fn new(soups: Vec<TriangleSoup>) -> Self {
+        let surfaces = soups.iter().map(|s| Surfaces::new(&s.materials, &s.textures)).collect();
+        Self { soups, surfaces }
+    }
+
+    pub(crate) fn soups(&self) -> &[TriangleSoup] {
+        &self.soups
+    }
+}
+
+/// What `camera` sees of `scene` in each of `crops`, with the scene's sun, sky and shadows.
+pub(crate) fn pictures(
+    scene: &Scene,
+    sources: &Sources,
+    camera: &Camera,
+    crops: &[Crop],
+    side: u32,
+) -> Vec<Picture> {
+    let vertices = ground_vertices(&scene.land, &scene.file.land);
+    let ground = ground_soup(&scene.land, &vertices);
+    let bare = Surfaces::new(&ground.materials, &[]);
+    let stances = scene.stances();
+    let mut kinds: Vec<Kind> = sources
+        .soups
+        .iter()
+        .zip(&sources.surfaces)
+        .zip(&stances)
+        .map(|((soup, surfaces), s)| Kind { soup, surfaces, anchor: s.anchor })
+        .collect();
+    let (position, anchor) = (DVec3::ZERO, ground.origin);
+    kinds.push(Kind { soup: &ground, surfaces: &bare, anchor });
+    let tree = |t: &forest_scene::Instance| {
+        let stance = &stances[t.species()];
+        Planted {
+            kind: t.species() as u32,
+            position: DVec3::from_array(t.position.map(f64::from)),
+            yaw: t.yaw(),
+            scale: t.scale(stance.scale) * stance.unit,
+        }
+    };
+    let mut planted: Vec<Planted> = scene.trees.iter().map(tree).collect();
+    planted.push(Planted { kind: sources.soups.len() as u32, position, yaw: 0.0, scale: 1.0 });
+    let grove = Grove::new(&kinds, &planted);
+    let sampling = Sampling { side, seed: 1 };
+    let style = Style { sampling, light: scene.file.sun.light() };
+    crops
+        .iter()
+        .map(|c| {
+            let picture = grove.picture(camera, &style, c.corner, c.size);
+            over_sky(picture, camera, &scene.file.sky, *c)
+        })
+        .collect()
+}
+
+/// The picture of a crop over the sky.
+fn over_sky(mut picture: Picture, camera: &Camera, sky: &Sky, crop: Crop) -> Picture {
+    let unit = camera.pixels_per_unit(1.0);
+    for (i, pixel) in picture.pixels.iter_mut().enumerate() {
+        let [x, y] = [i as u32 % crop.size[0], i as u32 / crop.size[0]];
+        let right = f64::from(crop.corner[0] + x) + 0.5 - 0.5 * f64::from(camera.width);
+        let up = 0.5 * f64::from(camera.height) - f64::from(crop.corner[1] + y) - 0.5;
+        let ray = camera.forward + (camera.right * right + camera.up * up) / unit;
+        let behind = sky.color(ray.normalize());
+        let open = 1.0 - pixel[3];
+        for k in 0..3 {
+            pixel[k] += behind[k] * open;
+        }
+        pixel[3] = 1.0;
+    }
+    picture
+}
