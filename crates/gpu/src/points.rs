@@ -50,6 +50,8 @@ pub(crate) struct CellUniform {
     first_triangle: u32,
     mask: u32,
     clump: f32,
+    cut: f32,
+    zero: [f32; 3],
 }
 
 /// `Chunk` of chunk.wgsl.
@@ -237,6 +239,8 @@ fn cell_uniform(block: &PointsBlock, cell: &CellRecord, camera: &Camera) -> Cell
         first_triangle: block.points.len() as u32,
         mask: 0,
         clump: 0.0,
+        cut: f32::NEG_INFINITY,
+        zero: [0.0; 3],
     }
 }
 

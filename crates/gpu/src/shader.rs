@@ -129,6 +129,7 @@ fn constants() -> String {
         ("TILE", forest_scene::TILE as u32),
         ("PATCH", forest_scene::PATCH),
         ("BLOCK", landscape::BLOCK),
+        ("VIEW_STEPS", landscape::VIEW_STEPS),
         ("PROBE", landscape::PROBE),
         ("MOST_NEARNESS", landscape::MOST_NEARNESS as u32),
         ("MOST_BANDS", landscape::MOST_BANDS as u32),
@@ -139,6 +140,7 @@ fn constants() -> String {
     let floats = [
         ("DIFFUSE", forest_scene::DIFFUSE),
         ("DEPTH_STEPS", f64::from(forest_scene::DEPTH_STEPS)),
+        ("LEAST_THROUGH_TREES", landscape::LEAST_THROUGH_TREES),
         ("LEAST_SHARE", landscape::LEAST_SHARE),
         ("SIZE_TOP", SizeCode::LOG2_TOP),
         ("SIZES_PER_OCTAVE", SizeCode::PER_OCTAVE),

@@ -119,17 +119,6 @@ impl Canopy {
         let lit: f64 = self.points.iter().map(|p| weight(p) * part(p.depth.into())).sum();
         if all > 0.0 { -(lit / all).ln() } else { 0.0 }
     }
-
-    /// Mean optical depth on the way through the whole tree: its thickness over the area of the ellipse
-    /// in its box, seen from the side.
-    pub fn depth(&self, stance: &Stance) -> f64 {
-        let [min, max] = stance.bounds;
-        let size = max - min;
-        let wide = 0.5 * (size.x + size.z);
-        let ellipse = std::f64::consts::FRAC_PI_4 * wide * size.y;
-        let all: f64 = self.points.iter().map(|p| f64::from(p.thickness)).sum();
-        if ellipse > 0.0 { all / ellipse } else { 0.0 }
-    }
 }
 
 /// A species as it is opened.

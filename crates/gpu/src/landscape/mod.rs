@@ -19,13 +19,19 @@ pub use pass::LandscapeRenderer;
 pub use target::LandscapeTarget;
 
 /// Samples along a side of a block of the nearness pyramid.
-pub(crate) const BLOCK: u32 = 8;
+pub(crate) const BLOCK: u32 = 4;
 
 /// Samples along a side of the square that a probe stands for.
 pub(crate) const PROBE: u32 = BLOCK / 2;
 
 /// What is seen less of than this share is drawn no coarser.
-pub(crate) const LEAST_SHARE: f64 = 1.0 / 64.0;
+pub(crate) const LEAST_SHARE: f64 = 1.0 / 16.0;
+
+/// Places on the way to the eye that are asked for trees.
+pub(crate) const VIEW_STEPS: u32 = 10;
+
+/// What less light than this comes through to the eye from is left out.
+pub(crate) const LEAST_THROUGH_TREES: f64 = 1.0 / 256.0;
 
 /// Levels of the pyramid, and the probes.
 pub(crate) const MOST_NEARNESS: usize = 8;

@@ -113,7 +113,7 @@ impl<'s> Landscape<'s> {
         let table = |what: &str, bytes: &[u8]| gpu.storage(what, &[bytes]);
         let parts: Vec<&[u8]> = blocks.iter().map(|b| bytemuck::cast_slice(b.points)).collect();
         let points = gpu.storage("points of all species", &parts)?;
-        let cells = gpu.buffer("cells of trees", MOST_CELLS * 64, storage)?;
+        let cells = gpu.buffer("cells of trees", MOST_CELLS * size_of::<CellUniform>() as u64, storage)?;
         let radii = table("radii", bytemuck::cast_slice(&tables.radii))?;
         let trees = table("trees", bytemuck::cast_slice(&scene.trees))?;
         let species = table("species", bytemuck::cast_slice(&tables.species))?;
@@ -316,4 +316,4 @@ fn opacity_maps(
     Ok([map(to_sun), map(DVec3::Y)])
 }
 
-const _: () = assert!(size_of::<CellUniform>() == 64);
+const _: () = assert!(size_of::<CellUniform>() == 80);

@@ -26,9 +26,10 @@ pub(crate) struct SpeciesRecord {
     triangle_number: u32,
     pub(crate) first_run: u32,
     pub(crate) runs: u32,
-    depth: f32,
     clump: f32,
-    zero: [u32; 2],
+    wide: f32,
+    tall: f32,
+    zero: f32,
 }
 
 /// `Stock` of trees.wgsl.
@@ -117,9 +118,10 @@ impl Tables {
             triangle_number: 0,
             first_run: 0,
             runs: 0,
-            depth: canopy.depth(stance) as f32,
             clump: canopy.clump() as f32,
-            zero: [0; 2],
+            wide: ((max - min).with_y(0.0).length() * 0.5) as f32,
+            tall: ((max.y - min.y) * 0.5) as f32,
+            zero: 0.0,
         });
         self.points += block.points.len() as u32;
         Ok(())

@@ -21,6 +21,11 @@ struct Cell {
     mask: u32,
     // Optical depth before each leaf, for all light.
     clump: f32,
+    // Height from the eye below which nothing is drawn.
+    cut: f32,
+    zero0: f32,
+    zero1: f32,
+    zero2: f32,
 }
 
 // A vector of the block in the world.

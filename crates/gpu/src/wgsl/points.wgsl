@@ -28,6 +28,11 @@ fn point_axis(turn: vec2f, p: vec4u) -> vec3f {
     return turned(turn, decode_axis(vec2u((p.y >> 16u) & 0xffu, p.y >> 24u)));
 }
 
+// Whether a point lies below what is drawn of its cell. (Turning does not change heights.)
+fn is_cut(cell: Cell, p: vec4u) -> bool {
+    return cell.origin.y + f32(p.x >> 16u) * cell.step < cell.cut;
+}
+
 fn ellipse(cell: Cell, p: vec4u) -> Ellipse {
     let place = place_in(cell, vec3u(p.x & 0xffffu, p.x >> 16u, p.y & 0xffffu));
     let at = project(place);

@@ -49,15 +49,20 @@ fn cull(
     if distance < bitcast<f32>(band.z) || distance >= bitcast<f32>(band.w) || is_beside(center, radius) {
         return;
     }
-    let share = ball_open(center, radius);
+    let share = cylinder_open(center, s.wide * t.scale, s.tall * t.scale);
     if share == 0.0 {
         return;
     }
     if RUN == 0u {
         atomicAdd(&work.trees, 1u);
     }
+    // Of far trees, what others hide is left out by height.
+    let visible = visible_from(t, s);
+    if visible.y == 0.0 {
+        return;
+    }
     let unit = pixels(t, s.block_unit, length(place_of(t, s.origin)));
-    let fine = code_at_most(land.finest * coarser(share) / (unit * unit));
+    let fine = code_at_most(land.finest * coarser(share * visible.y) / (unit * unit));
     if fine < s.root_parent {
         if RUN == 0u {
             let slot = atomicAdd(&work.near, 1u);
@@ -75,17 +80,39 @@ fn cull(
         if RUN == 0u {
             atomicAdd(&work.points, count);
         }
-        splat_few(t, s, stock, fine, count);
+        splat_few(t, s, stock, fine, count, visible.x);
         return;
     }
     if RUN == 0u {
         atomicAdd(&work.points, count);
         // Nothing stands in for a surfel, however large.
-        let cell = put_cell(t, s, stock, fine, 4094);
+        let cell = put_cell(t, s, stock, fine, 4094, visible.x);
         if cell >= 0 {
             put_points(u32(cell), stock.first_point, count);
         }
     }
+}
+
+// Parts of a tree's height that are looked at one by one.
+const SLICES = 4u;
+
+// Height from the eye above which some of a tree may be seen, and the largest share that may be.
+fn visible_from(t: Tree, s: Species) -> vec2f {
+    let middle = place_of(t, s.center);
+    let tall = s.tall * t.scale;
+    var cut = 3.0e38;
+    var most = 0.0;
+    for (var k = SLICES; k > 0u; k--) {
+        let low = middle.y - tall + 2.0 * tall * f32(k - 1u) / f32(SLICES);
+        let place = vec3f(middle.x, low + tall / f32(SLICES), middle.z);
+        let through = exp(-depth_to_eye(place));
+        if through >= LEAST_THROUGH_TREES {
+            cut = low;
+            most = max(most, through);
+        }
+    }
+    // The lowest part reaches down to the ground, and farther.
+    return vec2f(select(cut, -3.0e38, cut <= middle.y - tall), most);
 }
 
 // Radius in pixels of a disc of one pixel.
@@ -93,7 +120,7 @@ const LEAST_RADIUS = 0.5642;
 
 // A few points, at once. What is smaller than a pixel is as likely to be seen as it would cover its
 // middle: it is drawn a pixel large, and as much less opaque.
-fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32) {
+fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32) {
     let cell = Cell(
         place_of(t, stock.origin),
         stock.step * t.scale,
@@ -107,11 +134,15 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32) {
         0u,
         t.mask,
         s.clump,
+        cut,
+        0.0,
+        0.0,
+        0.0,
     );
     for (var k = 0u; k < count; k++) {
         let index = stock.first_point + k;
         let p = points[index];
-        if !is_drawn(cell, p.w) {
+        if !is_drawn(cell, p.w) || is_cut(cell, p) {
             continue;
         }
         var e = ellipse(cell, p);
@@ -196,7 +227,6 @@ fn choose(
     let t = tree_of(near.x);
     let s = species_table[t.species];
     let block_fine = i32(near.y) - 1;
-    let middle = place_of(t, s.center);
     for (var i = lane; i < s.cells; i += 64u) {
         let stock = stocks[s.first_cell + i];
         let is_top = stock.is_top != 0u;
@@ -212,10 +242,12 @@ fn choose(
         if share == 0.0 {
             continue;
         }
-        // What the tree itself has before the cell: nothing at its front, all of it at its back. (The
-        // paper adds k·Z to the threshold.)
-        let z = dot(center - middle, normalize(middle)) / (s.radius * t.scale);
-        share *= exp(-s.depth * clamp(0.5 * (z + 1.0), 0.0, 1.0));
+        // What trees have before the cell, itself among them. (The paper adds k·Z to the threshold.)
+        let through = exp(-depth_to_eye(center));
+        if through < LEAST_THROUGH_TREES {
+            continue;
+        }
+        share *= through;
         let here = pixels(t, s.block_unit, length(center));
         let finest = land.finest * coarser(share);
         let code = code_at_most(finest / (here * here));
@@ -231,7 +263,7 @@ fn choose(
         if count + triangles == 0u {
             continue;
         }
-        let cell = put_cell(t, s, stock, fine, coarse);
+        let cell = put_cell(t, s, stock, fine, coarse, -3.0e38);
         if cell < 0 {
             continue;
         }

@@ -116,6 +116,34 @@ fn seen_at(off: vec3f) -> vec2f {
     ));
 }
 
+// Optical depth of the trees between a place from the eye and the eye: the sky's map holds how dense they
+// are, by height. `VIEW_STEPS` places are asked on the way, the more the nearer.
+fn depth_to_eye(off: vec3f) -> f32 {
+    let distance = length(off);
+    let toward = -off / distance;
+    // No farther than up to the highest tree.
+    let high = land.sky.low + 65535.0 / land.sky.steps - (off.y + land.eye.y);
+    let rise = max(toward.y, 1e-4);
+    let reach = min(distance, select(distance, high / rise, toward.y > 0.0));
+    var sum = 0.0;
+    for (var k = 0u; k < VIEW_STEPS; k++) {
+        let t = (f32(k) + 0.5) / f32(VIEW_STEPS);
+        // Squares: steps grow with the distance from the place.
+        let at = map_place(land.sky, off + land.eye + toward * (reach * t * t));
+        let texel_at = at.at + vec2i(at.part + 0.5);
+        if !is_in(land.sky, texel_at) {
+            continue;
+        }
+        let texel = sky_map[u32(texel_at.y) * land.sky.size.x + u32(texel_at.x)];
+        let slab = vec2f(f32(texel.x & 0xffffu), f32(texel.x >> 16u));
+        if at.y < slab.x && at.y > slab.y {
+            let thick = max(slab.x - slab.y, 1.0) / land.sky.steps;
+            sum += f32(texel.y & 0xffffu) / DEPTH_STEPS / thick * 2.0 * t;
+        }
+    }
+    return sum * reach / f32(VIEW_STEPS);
+}
+
 // Colours of splatted points: the square root of a quarter, 11, 11 and 10 bits; never 0.
 fn pack_color(rgb: vec3f) -> u32 {
     let v = vec3u(sqrt(clamp(rgb * 0.25, vec3f(0.0), vec3f(1.0))) * vec3f(2047.0, 2047.0, 1023.0) + 0.5);

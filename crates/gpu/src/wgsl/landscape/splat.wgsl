@@ -28,7 +28,7 @@ fn splat(
     let index = chunk.first + lane;
     let p = points[index];
     let cell = cells[chunk.cell];
-    if !is_drawn(cell, p.w) {
+    if !is_drawn(cell, p.w) || is_cut(cell, p) {
         return;
     }
     let e = ellipse(cell, p);

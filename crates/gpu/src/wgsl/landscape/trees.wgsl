@@ -28,12 +28,12 @@ struct Species {
     // Its runs of triangles, and how many there is room for.
     first_run: u32,
     runs: u32,
-    // Mean optical depth through the whole tree.
-    depth: f32,
     // Optical depth that a leaf has before it within its own clump.
     clump: f32,
-    zero0: u32,
-    zero1: u32,
+    // Radius of the upright cylinder about `center` that holds a tree, and half its height.
+    wide: f32,
+    tall: f32,
+    zero: f32,
 }
 
 // A cell of a species, in metres from the foot of a tree of scale 1.
@@ -135,6 +135,29 @@ fn ball_open(center: vec3f, radius: f32) -> f32 {
     return open_share(vec2u(low), vec2u(high), depth_value(depth + radius));
 }
 
+// The same of an upright cylinder: trees are taller than they are wide.
+fn cylinder_open(center: vec3f, wide: f32, tall: f32) -> f32 {
+    let depth = dot(center, frame.forward);
+    let up = -frame.down.y * tall;
+    // How far the cylinder reaches along the axes of the picture, and into it.
+    let reach = vec2f(wide, wide * sqrt(max(1.0 - frame.down.y * frame.down.y, 0.0)) + abs(up));
+    let thick = abs(frame.forward.y) * tall + wide * sqrt(max(1.0 - frame.forward.y * frame.forward.y, 0.0));
+    let near = depth - thick;
+    if near <= frame.near {
+        return 1.0;
+    }
+    let off = vec2f(dot(center, frame.right), dot(center, frame.down));
+    // Of a box that is seen, the corners farthest out are nearest to the eye or farthest from it.
+    let low = min((off - reach) / near, (off - reach) / (depth + thick)) * frame.scale;
+    let high = max((off + reach) / near, (off + reach) / (depth + thick)) * frame.scale;
+    let a = vec2u(clamp(0.5 * frame.size + low, vec2f(0.0), frame.size - 1.0));
+    let b = vec2u(clamp(0.5 * frame.size + high, vec2f(0.0), frame.size - 1.0));
+    if is_covered(a, b, depth_value(near)) {
+        return 0.0;
+    }
+    return open_share(a, b, depth_value(depth));
+}
+
 // What thresholds are raised by where only a share is seen. The error that is seen is the share times
 // that of the points, which grows about as the root of their area, and their number falls with it:
 // the sum of errors for a number of points is least if area grows as the share to the power −2/3.
@@ -154,8 +177,8 @@ fn pixels(t: Tree, block_unit: f32, distance: f32) -> f32 {
     return frame.scale / distance * block_unit * t.scale;
 }
 
-// The cell of a tree as it is drawn; -1 if there is no room.
-fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32) -> i32 {
+// The cell of a tree as it is drawn above height `cut` from the eye; -1 if there is no room.
+fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32, cut: f32) -> i32 {
     let slot = atomicAdd(&work.cells, 1u);
     if slot >= arrayLength(&cells_out) {
         atomicAdd(&work.left_out, 1u);
@@ -174,6 +197,10 @@ fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32) -> i32 {
         stock.triangle_number,
         t.mask,
         s.clump,
+        cut,
+        0.0,
+        0.0,
+        0.0,
     );
     return i32(slot);
 }
