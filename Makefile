@@ -8,6 +8,8 @@
 #   make views    measure views; writes docs/VIEWS.md and docs/views.svg
 #   make volume   measure volumes; writes docs/VOLUME.md, docs/volume.svg, docs/volume_heldout.png
 #   make view     measure the viewer; writes docs/VIEWER.md and the README's pictures of it
+#   make landscape  measure landscapes beside full meshes, LOD meshes and billboards; writes docs/LANDSCAPE.md
+#                 and the README's table (needs 6 GiB)
 #   make codebooks  codebook training beside faiss and scikit-learn, if $PYTHON has them; writes docs/CODEBOOKS.md
 #   make three    draw exported views in three.js, in a headless browser; writes docs/three.png
 #   make picture  draw the README's picture anew
@@ -20,7 +22,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: gpu screen view demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+.PHONY: gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
 
 # Installs what variable `missing` of a recipe's shell names, or says what to install.
 INSTALL = if [ -n "$$missing" ]; then \
@@ -122,6 +124,10 @@ volume: setup
 view: gpu screen
 	$(CARGO) build --release --workspace --bins
 	target/release/viewer
+
+landscape: gpu
+	$(CARGO) build --release --workspace --bins
+	target/release/landscape
 
 codebooks: setup
 	$(CARGO) build --release --workspace --bins

@@ -10,6 +10,7 @@ mod gpu; // the graphics device against the CPU renderer, sample by sample
 mod ground_truth; // the pictures that packs are judged against: two ways, and another's
 mod hard_cases; // degenerate and extreme soups, each with its expected number
 mod invariance; // threads, places and scales that must not matter
+mod landscape; // landscapes: made, drawn, beside ground truth
 mod real_trees; // trees by others, where they are present
 mod support; // temporary folders, running the program
 mod view; // forest-view: pictures, window, exit codes

@@ -1,6 +1,7 @@
 //! What tests, the golden packs and the fuzz targets share.
 
 pub mod golden;
+pub mod landscapes;
 pub mod pictures;
 pub mod reference;
 pub mod reports;

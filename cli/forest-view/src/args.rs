@@ -68,11 +68,11 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive)]
     pub(crate) texel: f64,
     /// auto: the cheapest level of all representations whose FLIP error is at most this in all
-    /// measured views.
-    #[arg(long, default_value_t = forest_gpu::JUST_NOTICEABLE, value_name = "FLIP")]
-    #[arg(value_parser = positive32)]
-    pub(crate) error: f32,
-    /// auto: the best level that so many pictures a second leave time for.
+    /// measured views; default: 0.05. Scenes: the coarsest points that are so good.
+    #[arg(long, value_name = "FLIP", value_parser = positive32)]
+    pub(crate) error: Option<f32>,
+    /// auto: the best level that so many pictures a second leave time for. Scenes: points as coarse as
+    /// that asks for.
     #[arg(long, value_name = "N", conflicts_with = "error", value_parser = positive)]
     pub(crate) fps: Option<f64>,
     /// Light, without shadows.

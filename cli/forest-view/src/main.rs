@@ -50,6 +50,9 @@ fn main() -> ExitCode {
 fn run_scene(args: &Args, path: &Path) -> Result<()> {
     let start = Instant::now();
     let scene = Scene::open(path)?;
+    if !args.headless && args.bench.is_none() {
+        return scene::window(args, &scene);
+    }
     let instance = forest_gpu::instance(args.adapter.is_some(), None);
     let gpu = Gpu::open(&instance, args.adapter.as_deref(), None)?;
     match args.bench {

@@ -43,7 +43,9 @@ impl Settings {
             level: args.level,
             blending: args.blend.into(),
             texel: args.texel,
-            goal: args.fps.map_or(Goal::Error(args.error), Goal::Rate),
+            goal: args
+                .fps
+                .map_or(Goal::Error(args.error.unwrap_or(forest_gpu::JUST_NOTICEABLE)), Goal::Rate),
             light: args.light.light(args.self_shadow),
             side: args.samples,
         }

@@ -66,7 +66,8 @@ pub use device::{Display, Gpu, adapters, describe, instance};
 pub use error::GpuError;
 pub use frame::{Frame, Layer, What};
 pub use landscape::{
-    Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget,
+    Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Steering,
+    finest_for,
 };
 pub use model::Model;
 pub use present::{Look, Presenter, Shown, read_picture, read_samples};

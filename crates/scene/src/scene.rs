@@ -7,10 +7,20 @@ use crate::heightmap::Grey;
 use crate::instances::{self, Instance};
 use crate::land::Land;
 use crate::scatter::Scatter;
-use crate::species::{Species, Stance};
+use crate::shade::{Casters, OpacityMap};
+use crate::species::{Canopy, Species, Stance};
 use forest_pack::Pack;
 use forest_points::PointsBlock;
+use forest_raster::Light;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
+
+/// Texels along the longer side of the opacity maps, and metres of the smallest.
+const MAP_SIDE: u32 = 2048;
+const MAP_TEXEL: f64 = 1.0;
+
+/// Points that stand for a tree in the opacity maps: a few a texel of its own width.
+const CANOPY: std::ops::RangeInclusive<f64> = 8.0..=256.0;
 
 /// A landscape and its trees.
 #[derive(Debug)]
@@ -47,6 +57,30 @@ impl Scene {
     /// How the trees of each species stand.
     pub fn stances(&self) -> Vec<Stance> {
         self.species.iter().map(|s| s.stance).collect()
+    }
+
+    /// The opacity maps of all trees along the sun, and from above.
+    ///
+    /// # Errors
+    /// When the points of a pack are damaged.
+    pub fn opacity_maps(&self) -> Result<[OpacityMap; 2], SceneError> {
+        let to_sun = match self.file.sun.light() {
+            Light::Sun(sun) => sun.to_sun,
+            Light::Albedo => DVec3::Y,
+        };
+        let wide = self.land.size[0].max(self.land.size[1]);
+        let texel = MAP_TEXEL.max(wide / f64::from(MAP_SIDE));
+        let canopy = |species: &Species| -> Result<Canopy, SceneError> {
+            let [min, max] = species.stance.bounds;
+            let texels = (max - min).max_element() / texel;
+            let most = (4.0 * texels * texels).clamp(*CANOPY.start(), *CANOPY.end());
+            Ok(Canopy::new(&species.points()?, &species.stance, most as u64))
+        };
+        let canopies: Vec<Canopy> = self.species.iter().map(canopy).collect::<Result<_, _>>()?;
+        let stances = self.stances();
+        let casters = Casters { trees: &self.trees, stances: &stances, canopies: &canopies };
+        let map = |light| OpacityMap::new(&self.land, &casters, light, texel, 2 * MAP_SIDE);
+        Ok([map(to_sun), map(DVec3::Y)])
     }
 }
 

@@ -255,7 +255,8 @@ mod tests {
 
     /// One tree in the middle: a ball of radius 4 m, 10 m above the ground, of thickness 40 m².
     fn map(to_light: DVec3) -> OpacityMap {
-        let points = vec![CanopyPoint { off: Vec3::Y * 10.0, radius: 4.0, thickness: 40.0, depth: 1.0 }];
+        let points =
+            vec![CanopyPoint { off: Vec3::Y * 10.0, radius: 4.0, thickness: 40.0, depth: 1.0 }];
         let bounds = [DVec3::new(-4.0, 0.0, -4.0), DVec3::new(4.0, 14.0, 4.0)];
         let stance = Stance { anchor: DVec3::ZERO, unit: 1.0, scale: [1.0, 1.0], bounds };
         let casters = Casters {

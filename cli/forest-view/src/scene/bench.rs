@@ -47,13 +47,14 @@ pub(crate) fn run(args: &Args, gpu: &Gpu, scene: &Scene, start: Instant) -> Resu
     let mut landscape = Landscape::load(gpu, &renderer, scene)?;
     let target = LandscapeTarget::new(gpu, &renderer, args.size, args.samples)?;
     let load_s = start.elapsed().as_secs_f64();
-    let (timer, detail) = (Timer::new(gpu), super::detail(args));
+    let (timer, mut goal) = (Timer::new(gpu), super::Goal::new(args, scene)?);
     let mut take = |i: usize| -> Result<(f64, Option<f64>, LandscapeDrawn)> {
         let camera = sights[i].camera(&scene.land, args.size);
         let start = Instant::now();
-        renderer.render(gpu, &mut landscape, &target, &camera, &detail, timer.as_ref());
+        renderer.render(gpu, &mut landscape, &target, &camera, &goal.detail(), timer.as_ref());
         gpu.finish()?;
         let frame_ms = start.elapsed().as_secs_f64() * 1e3;
+        goal.took(frame_ms);
         let device_ms = timer.as_ref().map(|t| t.milliseconds(gpu)).transpose()?;
         Ok((frame_ms, device_ms, landscape.drawn(gpu)?))
     };

@@ -1,8 +1,11 @@
-//! Scene files: pictures and benches without a window.
+//! Scene files: in a window, or as pictures and benches without one.
 
 mod bench;
+mod walk;
+mod window;
 
 pub(crate) use bench::run as bench;
+pub(crate) use window::run as window;
 
 use crate::args::Args;
 use crate::failure::Usage;
@@ -10,16 +13,21 @@ use crate::output;
 use anyhow::{Context, Result};
 use forest_gpu::{
     Gpu, Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Look,
-    Options, read_picture,
+    Options, Steering, finest_for, read_picture,
 };
+use forest_pack::measures::Measures;
 use forest_points::{PixelArea, Thresholds};
 use forest_scene::{Scene, Sight};
 use std::path::Path;
+use std::time::Instant;
 
 /// Whether a file is a scene file, by its name.
 pub(crate) fn is_scene(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
+
+/// Pictures that are drawn to find out what a rate leaves time for.
+const STEERED: usize = 12;
 
 /// Draws the picture that `args` ask for.
 pub(crate) fn headless(args: &Args, gpu: &Gpu, scene: &Scene) -> Result<()> {
@@ -28,8 +36,16 @@ pub(crate) fn headless(args: &Args, gpu: &Gpu, scene: &Scene) -> Result<()> {
     let renderer = LandscapeRenderer::new(gpu, &Options::default())?;
     let mut landscape = Landscape::load(gpu, &renderer, scene)?;
     let target = LandscapeTarget::new(gpu, &renderer, args.size, args.samples)?;
-    renderer.render(gpu, &mut landscape, &target, &camera, &detail(args), None);
-    let drawn = landscape.drawn(gpu)?;
+    let mut goal = Goal::new(args, scene)?;
+    let mut drawn = LandscapeDrawn::default();
+    // Until a rate is reached, where one is asked for.
+    let most = if args.fps.is_some() { STEERED } else { 1 };
+    for _ in 0..most {
+        let start = Instant::now();
+        renderer.render(gpu, &mut landscape, &target, &camera, &goal.detail(), None);
+        drawn = landscape.drawn(gpu)?;
+        goal.took(start.elapsed().as_secs_f64() * 1e3);
+    }
     let pixels = read_picture(gpu, target.samples(), &Look::default(), None)?;
     output::write_png(output, args.size, &pixels, false)?;
     if !args.quiet {
@@ -56,6 +72,57 @@ fn detail(args: &Args) -> LandscapeDetail {
         largest: PixelArea(largest),
         hidden: args.hidden,
         ..LandscapeDetail::default()
+    }
+}
+
+/// How finely to draw, from picture to picture.
+#[derive(Clone, Debug)]
+pub(crate) struct Goal {
+    detail: LandscapeDetail,
+    steering: Option<Steering>,
+}
+
+impl Goal {
+    /// As `args` say: for a rate, for an error, or as given.
+    pub(crate) fn new(args: &Args, scene: &Scene) -> Result<Self> {
+        let mut detail = detail(args);
+        if let (Some(error), None) = (args.error, args.fps) {
+            let tables: Vec<_> = scene
+                .species
+                .iter()
+                .map(|s| Measures::read(&s.pack).map(|m| (s, m)))
+                .collect::<Result<_, _>>()?;
+            if let Some((s, _)) = tables.iter().find(|(_, m)| m.is_none()) {
+                let pack = s.pack.path().display();
+                let text = "--error needs a measured table: bake with points --measure";
+                return Err(Usage(format!("{pack}: {text}")).into());
+            }
+            let found = finest_for(tables.iter().filter_map(|(_, m)| m.as_ref()), error);
+            let none = || Usage(format!("--error {error}: no level of all packs is so good"));
+            detail.finest = found.ok_or_else(none)?;
+            detail.largest = PixelArea(detail.finest.0 * Thresholds::LARGEST_RATIO);
+        }
+        let steering = args.fps.map(|rate| Steering::new(rate, &detail));
+        Ok(Self { detail, steering })
+    }
+
+    /// How to draw the next picture.
+    pub(crate) fn detail(&self) -> LandscapeDetail {
+        self.detail
+    }
+
+    /// Takes in what a picture took.
+    pub(crate) fn took(&mut self, ms: f64) {
+        if let Some(steering) = &mut self.steering {
+            self.detail = steering.next(ms, &self.detail);
+        }
+    }
+
+    /// Makes points so many times as large, where no rate is asked for.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        let (finest, largest) = (self.detail.finest.0, self.detail.largest.0);
+        self.detail.finest = PixelArea((finest * factor).clamp(0.05, 4096.0));
+        self.detail.largest = PixelArea((largest * factor).clamp(0.8, 65536.0));
     }
 }
 

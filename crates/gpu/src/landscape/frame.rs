@@ -221,9 +221,9 @@ mod tests {
         assert_eq!(bands.tiles[0], [100, 10]);
         let ends: Vec<f32> = bands.firsts.iter().map(|b| f32::from_bits(b[3])).collect();
         assert_eq!(ends[..4], [7.5, 12.0, 19.2, f32::MAX]);
-        // The first tile, 11 m to its far corner, lies in two bands; the second begins at 25 m.
+        // The first tile, 13 m to its far corner, lies in three bands; the second begins at 25 m.
         let counts: Vec<u32> = bands.firsts.iter().map(|b| b[1]).collect();
-        assert_eq!(counts[..4], [1, 1, 0, 29]);
-        assert_eq!(bands.firsts[3][0], 2);
+        assert_eq!(counts[..4], [1, 1, 1, 29]);
+        assert_eq!(bands.firsts[3][0], 3);
     }
 }

@@ -10,12 +10,14 @@
 mod frame;
 mod model;
 mod pass;
+mod steer;
 mod tables;
 mod target;
 
 pub use frame::{LandscapeDetail, LandscapeDrawn};
 pub use model::Landscape;
 pub use pass::LandscapeRenderer;
+pub use steer::{Steering, finest_for};
 pub use target::LandscapeTarget;
 
 /// Samples along a side of a block of the nearness pyramid.
@@ -31,7 +33,7 @@ pub(crate) const LEAST_SHARE: f64 = 1.0 / 16.0;
 pub(crate) const VIEW_STEPS: u32 = 10;
 
 /// What less light than this comes through to the eye from is left out.
-pub(crate) const LEAST_THROUGH_TREES: f64 = 1.0 / 256.0;
+pub(crate) const LEAST_THROUGH_TREES: f64 = 1.0 / 64.0;
 
 /// Levels of the pyramid, and the probes.
 pub(crate) const MOST_NEARNESS: usize = 8;

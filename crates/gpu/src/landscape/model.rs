@@ -12,11 +12,7 @@ use crate::points::{CellUniform, ChunkRecord};
 use crate::triangles::TrianglesModel;
 use bytemuck::{Pod, Zeroable};
 use forest_raster::Light;
-use forest_scene::{
-    Canopy, Casters, Ground, OpacityMap, PATCH, Patch, Scene, Stance, Tile, ground_vertices,
-    instances,
-};
-use glam::DVec3;
+use forest_scene::{Ground, PATCH, Patch, Scene, Tile, ground_vertices, instances};
 use wgpu::{
     BindGroup, BindingResource, Buffer, BufferBinding, BufferDescriptor, BufferSize, BufferUsages,
 };
@@ -34,13 +30,6 @@ const MOST_RUNS: u32 = 1 << 15;
 
 /// Words of `Work` before its list.
 pub(crate) const WORK_HEAD: usize = 8;
-
-/// Texels along the longer side of the opacity maps, and metres of the smallest.
-const MAP_SIDE: u32 = 2048;
-const MAP_TEXEL: f64 = 1.0;
-
-/// Points that stand for a tree in the opacity maps: a few a texel of its own width.
-const CANOPY: std::ops::RangeInclusive<f64> = 8.0..=256.0;
 
 /// `Patch` of ground.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -113,7 +102,8 @@ impl<'s> Landscape<'s> {
         let table = |what: &str, bytes: &[u8]| gpu.storage(what, &[bytes]);
         let parts: Vec<&[u8]> = blocks.iter().map(|b| bytemuck::cast_slice(b.points)).collect();
         let points = gpu.storage("points of all species", &parts)?;
-        let cells = gpu.buffer("cells of trees", MOST_CELLS * size_of::<CellUniform>() as u64, storage)?;
+        let cells =
+            gpu.buffer("cells of trees", MOST_CELLS * size_of::<CellUniform>() as u64, storage)?;
         let radii = table("radii", bytemuck::cast_slice(&tables.radii))?;
         let trees = table("trees", bytemuck::cast_slice(&scene.trees))?;
         let species = table("species", bytemuck::cast_slice(&tables.species))?;
@@ -137,7 +127,7 @@ impl<'s> Landscape<'s> {
         let tile_list = gpu.buffer("tiles", list, storage)?;
 
         let light = scene.file.sun.light();
-        let [sun, sky] = opacity_maps(scene, &blocks)?;
+        let [sun, sky] = scene.opacity_maps()?;
         let sun_map = table("light of the sun", bytemuck::cast_slice(&sun.texels))?;
         let sky_map = table("light of the sky", bytemuck::cast_slice(&sky.texels))?;
         let uniform = |what, size| gpu.buffer(what, size as u64, BufferUsages::UNIFORM);
@@ -290,30 +280,6 @@ impl<'s> Landscape<'s> {
         // Four corners, no instance yet.
         queue.write_buffer(&self.large, 0, bytemuck::cast_slice(&[4u32, 0, 0, 0]));
     }
-}
-
-/// The opacity maps along the sun, and from above.
-fn opacity_maps(
-    scene: &Scene,
-    blocks: &[forest_points::PointsBlock],
-) -> Result<[OpacityMap; 2], GpuError> {
-    let to_sun = match scene.file.sun.light() {
-        Light::Sun(sun) => sun.to_sun,
-        Light::Albedo => DVec3::Y,
-    };
-    let wide = scene.land.size[0].max(scene.land.size[1]);
-    let texel = MAP_TEXEL.max(wide / f64::from(MAP_SIDE));
-    let stances = scene.stances();
-    let canopy = |(block, stance): (&forest_points::PointsBlock, &Stance)| {
-        let [min, max] = stance.bounds;
-        let texels = (max - min).max_element() / texel;
-        let most = (4.0 * texels * texels).clamp(*CANOPY.start(), *CANOPY.end());
-        Canopy::new(block, stance, most as u64)
-    };
-    let canopies: Vec<Canopy> = blocks.iter().zip(&stances).map(canopy).collect();
-    let casters = Casters { trees: &scene.trees, stances: &stances, canopies: &canopies };
-    let map = |light| OpacityMap::new(&scene.land, &casters, light, texel, 2 * MAP_SIDE);
-    Ok([map(to_sun), map(DVec3::Y)])
 }
 
 const _: () = assert!(size_of::<CellUniform>() == 80);

@@ -89,10 +89,10 @@ mod tests {
     #[test]
     fn levels_halve_and_do_not_overlap() {
         let (head, count) = pyramid([1280, 720]);
-        assert_eq!(head[..3], [160, 90, 0]);
-        assert_eq!(head[4..7], [80, 45, 14_400]);
-        assert_eq!(head[8..11], [40, 23, 18_000]);
-        assert_eq!(head[24..27], [3, 2, 19_154]);
-        assert_eq!((&head[28..31], count), (&[320, 180, 19_160][..], 19_160 + 57_600));
+        assert_eq!(head[..3], [320, 180, 0]);
+        assert_eq!(head[4..7], [160, 90, 57_600]);
+        assert_eq!(head[8..11], [80, 45, 72_000]);
+        assert_eq!(head[24..27], [5, 3, 76_820]);
+        assert_eq!((&head[28..31], count), (&[640, 360, 76_835][..], 76_835 + 230_400));
     }
 }

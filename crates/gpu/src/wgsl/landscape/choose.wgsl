@@ -62,7 +62,7 @@ fn cull(
         return;
     }
     let unit = pixels(t, s.block_unit, length(place_of(t, s.origin)));
-    let fine = code_at_most(land.finest * coarser(share * visible.y) / (unit * unit));
+    let fine = code_at_most(finest_seen(share * visible.y) / (unit * unit));
     if fine < s.root_parent {
         if RUN == 0u {
             let slot = atomicAdd(&work.near, 1u);
@@ -249,7 +249,7 @@ fn choose(
         }
         share *= through;
         let here = pixels(t, s.block_unit, length(center));
-        let finest = land.finest * coarser(share);
+        let finest = finest_seen(share);
         let code = code_at_most(finest / (here * here));
         let fine = select(min(code, stock.root_parent - 1), block_fine, is_top);
         let largest = code_at_most(max(land.largest, finest) / (here * here));

@@ -161,8 +161,8 @@ fn cylinder_open(center: vec3f, wide: f32, tall: f32) -> f32 {
 // What thresholds are raised by where only a share is seen. The error that is seen is the share times
 // that of the points, which grows about as the root of their area, and their number falls with it:
 // the sum of errors for a number of points is least if area grows as the share to the power −2/3.
-fn coarser(share: f32) -> f32 {
-    return pow(max(share, LEAST_SHARE), -land.hidden);
+fn finest_seen(share: f32) -> f32 {
+    return land.finest * pow(max(share, LEAST_SHARE), -land.hidden);
 }
 
 // The largest size code whose area is at most `area` of square block units; −1 for none:

@@ -1,5 +1,7 @@
-//! Parts of pictures of a landscape, by rays through all its trees.
+//! Ground truth of landscapes: parts of pictures, by rays through all trees; and how far pictures are
+//! from it.
 
+use forest_eval::Comparison;
 use forest_raster::{Grove, Kind, Picture, Planted, Sampling, Style, Surfaces};
 use forest_scene::{Scene, Sky, ground_soup, ground_vertices};
 use forest_soup::{Camera, TriangleSoup};
@@ -7,30 +9,35 @@ use glam::DVec3;
 
 /// A part of a picture: first pixel and size.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Crop {
-    pub(crate) corner: [u32; 2],
-    pub(crate) size: [u32; 2],
+pub struct Crop {
+    /// First pixel.
+    pub corner: [u32; 2],
+    /// Pixels across and down.
+    pub size: [u32; 2],
 }
 
 /// The soups of a scene's species, ready for rays.
-pub(crate) struct Sources {
+pub struct Sources {
     soups: Vec<TriangleSoup>,
     surfaces: Vec<Surfaces>,
 }
 
 impl Sources {
-    pub(crate) fn new(soups: Vec<TriangleSoup>) -> Self {
+    /// Soups in the order of the scene's species.
+    pub fn new(soups: Vec<TriangleSoup>) -> Self {
         let surfaces = soups.iter().map(|s| Surfaces::new(&s.materials, &s.textures)).collect();
         Self { soups, surfaces }
     }
 
-    pub(crate) fn soups(&self) -> &[TriangleSoup] {
+    /// The soups.
+    pub fn soups(&self) -> &[TriangleSoup] {
         &self.soups
     }
 }
 
-/// What `camera` sees of `scene` in each of `crops`, with the scene's sun, sky and shadows.
-pub(crate) fn pictures(
+/// What `camera` sees of `scene` in each of `crops`, with the scene's sun, sky and shadows; `side` ×
+/// `side` samples a pixel.
+pub fn pictures(
     scene: &Scene,
     sources: &Sources,
     camera: &Camera,
@@ -89,4 +96,35 @@ fn over_sky(mut picture: Picture, camera: &Camera, sky: &Sky, crop: Crop) -> Pic
         pixel[3] = 1.0;
     }
     picture
+}
+
+/// Means of linear RGB over the `side` × `side` samples of each pixel.
+pub fn averaged(samples: &[[f32; 4]], width: u32, height: u32, side: u32) -> Vec<[f32; 3]> {
+    let share = 1.0 / (side * side) as f32;
+    let pixel = |i: u32| {
+        let (x, y) = (i % width * side, i / width * side);
+        let mut sum = [0.0; 3];
+        for s in 0..side * side {
+            let row = (y + s / side) * width * side;
+            let sample = samples[(row + x + s % side) as usize];
+            (0..3).for_each(|k| sum[k] += sample[k] * share);
+        }
+        sum
+    };
+    (0..width * height).map(pixel).collect()
+}
+
+/// Mean FLIP of a picture `width` pixels wide over crops of the truth.
+pub fn flip(picture: &[[f32; 3]], width: u32, crops: &[Crop], truth: &[Picture]) -> f64 {
+    let of = |(crop, truth): (&Crop, &Picture)| {
+        let [w, h] = crop.size;
+        let mut part = Picture::empty(w, h);
+        for (i, pixel) in part.pixels.iter_mut().enumerate() {
+            let (x, y) = (crop.corner[0] + i as u32 % w, crop.corner[1] + i as u32 / w);
+            let [r, g, b] = picture[(y * width + x) as usize];
+            *pixel = [r, g, b, 1.0];
+        }
+        Comparison::new(truth, &part).flip(0.0).mean()
+    };
+    crops.iter().zip(truth).map(of).sum::<f64>() / crops.len() as f64
 }

@@ -1,0 +1,271 @@
+//! Landscapes: made by `forest-bake scene`, drawn by `forest-view` and `forest-gpu`, beside ground truth.
+
+use crate::support::{arg, forest_bake, repo, run, succeed};
+use forest_gpu::{
+    Gpu, Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Options,
+    instance, read_samples,
+};
+use forest_scene::{Scene, Sight};
+use forest_soup::Camera;
+use forest_tests::landscapes::{Crop, Sources, averaged, flip, pictures};
+use forest_tests::reports::load_soup;
+use forest_tests::screen::Screen;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+
+const TREES: [&str; 3] = ["conifer.glb", "broadleaf_young.gltf", "shrub.obj"];
+
+/// Packs of the sample trees, baked once.
+fn packs() -> &'static [PathBuf] {
+    static PACKS: LazyLock<(tempfile::TempDir, Vec<PathBuf>)> = LazyLock::new(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let bake = |tree: &&str| {
+            let pack = dir.path().join(tree).with_extension("fpack");
+            succeed(&["points", &arg(&repo("sample-data").join(tree)), "-o", &arg(&pack), "-q"]);
+            pack
+        };
+        let packs = TREES.iter().map(bake).collect();
+        (dir, packs)
+    });
+    &PACKS.1
+}
+
+/// Makes a scene of the sample trees, each as high as a tree.
+fn make(folder: &Path, trees: u32, more: &[&str]) -> PathBuf {
+    let path = folder.join("forest.toml");
+    let heights = ["height=14", "height=11,weight=2", "height=5,weight=0.5"];
+    let packs = packs().iter().zip(heights).map(|(p, h)| format!("{}:{h}", p.display()));
+    let packs: Vec<String> = packs.collect();
+    let (count, output) = (trees.to_string(), arg(&path));
+    let mut args = vec!["scene"];
+    args.extend(packs.iter().map(String::as_str));
+    args.extend(["-o", &output, "--trees", &count, "-q"]);
+    args.extend(more);
+    succeed(&args);
+    path
+}
+
+fn device() -> Gpu {
+    Gpu::open(&instance(false, None), None, None).unwrap()
+}
+
+struct Drawn {
+    pixels: Vec<[f32; 3]>,
+    counts: LandscapeDrawn,
+}
+
+/// Draws a scene with one sample a side.
+fn draw(
+    gpu: &Gpu,
+    scene: &Scene,
+    camera: &Camera,
+    detail: &LandscapeDetail,
+    narrow: bool,
+    side: u32,
+) -> Drawn {
+    let options = Options { narrow_atomics: narrow, ..Options::default() };
+    let renderer = LandscapeRenderer::new(gpu, &options).unwrap();
+    let mut landscape = Landscape::load(gpu, &renderer, scene).unwrap();
+    let size = [camera.width, camera.height];
+    let target = LandscapeTarget::new(gpu, &renderer, size, side).unwrap();
+    renderer.render(gpu, &mut landscape, &target, camera, detail, None);
+    let counts = landscape.drawn(gpu).unwrap();
+    assert_eq!(counts.left_out, 0);
+    let samples = read_samples(gpu, target.samples()).unwrap();
+    Drawn { pixels: averaged(&samples, size[0], size[1], side), counts }
+}
+
+fn mean(pixels: impl Iterator<Item = [f32; 3]>) -> [f32; 3] {
+    let (sum, n) = pixels.fold(([0.0; 3], 0), |(s, n), p| ([0, 1, 2].map(|k| s[k] + p[k]), n + 1));
+    sum.map(|v| v / n as f32)
+}
+
+#[test]
+fn a_landscape_is_made_and_planted_anew() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = make(dir.path(), 500, &["--seed", "7", "--square", "10"]);
+    let table = path.with_extension("trees");
+    let (text, trees) = (std::fs::read(&path).unwrap(), std::fs::read(&table).unwrap());
+    // 500 expected; a Poisson number strays by 22.
+    let scene = Scene::open(&path).unwrap();
+    assert!((400..600).contains(&scene.trees.len()), "{}", scene.trees.len());
+    for t in &scene.trees {
+        let [x, y, z] = t.position.map(f64::from);
+        assert_eq!(y as f32, scene.land.height(x, z) as f32);
+    }
+    // Planted anew: the same, with one thread too; and another seed is another forest.
+    std::fs::remove_file(&table).unwrap();
+    succeed(&["scene", &arg(&path), "--plant", "-q", "--threads", "1"]);
+    assert_eq!(std::fs::read(&table).unwrap(), trees);
+    let again = run(&["scene", &arg(&packs()[0]), "-o", &arg(&path)]);
+    assert!(
+        again.0 == 1 && again.2.contains("forest.toml: is there already; --force"),
+        "{again:?}"
+    );
+    assert_eq!(std::fs::read(&path).unwrap(), text);
+    make(dir.path(), 500, &["--seed", "8", "--square", "10", "--force"]);
+    assert_ne!(std::fs::read(&table).unwrap(), trees);
+}
+
+#[test]
+fn wrong_scenes_are_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = make(dir.path(), 50, &[]);
+    let good = std::fs::read_to_string(&path).unwrap();
+    let cases = [
+        ("seed = 1", "seeds = 1", "unknown field `seeds`"),
+        ("range = ", "range = -", "land.fractal: a range of -"),
+        ("cells = 8\n", "cells = 9\n", "9 cells; it must be a power of two"),
+        ("trees = 50.0", "trees = 5e9", "forest.trees: 5000000000; it must be within"),
+        ("elevation = 48.0", "elevation = 2.0", "sun.elevation: 2; it must be within 6 and 90"),
+        ("\"within\"]", "\"without\"]", "path flight: no camera is named without"),
+        ("forest.trees\"", "gone.trees\"", "gone.trees: reading the trees"),
+    ];
+    for (old, new, what) in cases {
+        assert!(good.contains(old), "{old}\n{good}");
+        std::fs::write(&path, good.replace(old, new)).unwrap();
+        let error = Scene::open(&path).unwrap_err();
+        assert!(error.to_string().contains(what), "{what}: {error}");
+        let code = if what.contains("gone") { 2 } else { 3 };
+        let program = Path::new(forest_bake().get_program()).with_file_name("forest-view");
+        let mut view = Command::new(program);
+        let png = arg(&dir.path().join("no.png"));
+        let output = view.args([&arg(&path), "--headless", "-o", &png]).output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{what}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains(what), "{what}");
+    }
+    let wrong = run(&["scene", "oak.fpack:colour=3", "-o", &arg(&dir.path().join("x.toml"))]);
+    assert!(wrong.0 == 1 && wrong.2.contains("\"colour=3\""), "{wrong:?}");
+}
+
+/// Crops of a picture of 320 × 180 pixels.
+const CROPS: [Crop; 2] =
+    [Crop { corner: [20, 70], size: [96, 54] }, Crop { corner: [180, 110], size: [96, 54] }];
+
+#[test]
+fn the_picture_is_near_its_ground_truth() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make(dir.path(), 600, &[])).unwrap();
+    let soups = TREES.iter().map(|t| load_soup(&repo("sample-data").join(t)).unwrap());
+    let sources = Sources::new(soups.collect());
+    let camera = scene.file.camera(None).unwrap().camera(&scene.land, [320, 180]);
+    let truth = pictures(&scene, &sources, &camera, &CROPS, 4);
+    let error = |hidden: f64| {
+        let detail = LandscapeDetail { hidden, ..LandscapeDetail::default() };
+        let drawn = draw(&gpu, &scene, &camera, &detail, false, 2);
+        let crop = |c: &Crop| {
+            let Crop { corner: [x, y], size: [w, h] } = *c;
+            (0..w * h).map(move |i| ((y + i / w) * 320 + x + i % w) as usize)
+        };
+        let ours = mean(CROPS.iter().flat_map(crop).map(|i| drawn.pixels[i]));
+        (flip(&drawn.pixels, 320, &CROPS, &truth), ours, drawn.counts)
+    };
+    let theirs = mean(truth.iter().flat_map(|t| &t.pixels).map(|p| [p[0], p[1], p[2]]));
+    let (all, bright, counts) = error(0.0);
+    for k in 0..3 {
+        let ratio = bright[k] / theirs[k];
+        assert!((0.8..1.25).contains(&ratio), "{bright:?} is not as bright as {theirs:?}");
+    }
+    assert!(all < 0.3, "{all}");
+    // What is hidden is drawn with fewer points, and is no worse by much.
+    let (less, _, fewer) = error(2.0 / 3.0);
+    assert!(less < all + 0.02, "{less} against {all}");
+    assert!(fewer.points < counts.points * 9 / 10, "{} of {}", fewer.points, counts.points);
+}
+
+#[test]
+fn what_is_left_out_behind_others_is_not_seen() {
+    // Without 64-bit atomics there is one band, and nothing is hidden by trees but what they draw over.
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make(dir.path(), 800, &[])).unwrap();
+    let detail = LandscapeDetail { hidden: 0.0, ..LandscapeDetail::default() };
+    for name in ["overview", "within"] {
+        let camera = scene.file.camera(Some(name)).unwrap().camera(&scene.land, [320, 180]);
+        let [bands, one] = [false, true].map(|n| draw(&gpu, &scene, &camera, &detail, n, 1));
+        let differ = bands.pixels.iter().zip(&one.pixels).filter(|(a, b)| a != b).count();
+        // Two points in the very same depth, of which either may be kept.
+        assert!(differ * 2000 < bands.pixels.len(), "{name}: {differ} samples differ");
+        assert!(bands.counts.points < one.counts.points, "{name}: nothing was left out");
+    }
+}
+
+#[test]
+fn trees_of_a_pixel_keep_their_colour() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make(dir.path(), 3000, &["--smoothness", "2"])).unwrap();
+    // From 8 km above: a land of 490 m is 40 pixels wide, trees are smaller than one.
+    let above = 8000.0;
+    let fov = 2.0 * (490.0f64 / 2.0 * 1.6 / above).atan().to_degrees();
+    let sight = Sight { name: "high".into(), at: [0.0; 2], above, yaw: 0.0, pitch: -90.0, fov };
+    let camera = sight.camera(&scene.land, [64, 64]);
+    let crop = [Crop { corner: [16, 16], size: [32, 32] }];
+    let soups = TREES.iter().map(|t| load_soup(&repo("sample-data").join(t)).unwrap());
+    let truth = pictures(&scene, &Sources::new(soups.collect()), &camera, &crop, 4);
+    let theirs = mean(truth[0].pixels.iter().map(|p| [p[0], p[1], p[2]]));
+    let drawn = draw(&gpu, &scene, &camera, &LandscapeDetail::default(), false, 2);
+    assert_eq!(drawn.counts.trees as usize, scene.trees.len());
+    assert!(drawn.counts.points < 8 * drawn.counts.trees, "{:?}", drawn.counts);
+    let inside = (0..1024usize).map(|i| drawn.pixels[(16 + i / 32) * 64 + 16 + i % 32]);
+    let ours = mean(inside);
+    for k in 0..3 {
+        let ratio = ours[k] / theirs[k];
+        assert!((0.8..1.25).contains(&ratio), "{ours:?} against {theirs:?}");
+    }
+}
+
+#[test]
+fn the_program_draws_measures_and_steers() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = arg(&make(dir.path(), 300, &[]));
+    let [png, json, shot] = ["a.png", "a.json", "b.png"].map(|n| arg(&dir.path().join(n)));
+    let program = Path::new(forest_bake().get_program()).with_file_name("forest-view");
+    let view = |args: &[&str], display: Option<&str>| {
+        let mut command = Command::new(&program);
+        command.args(args).env("XDG_RUNTIME_DIR", dir.path()).env_remove("WAYLAND_DISPLAY");
+        match display {
+            Some(display) => command.env("DISPLAY", display),
+            None => command.env_remove("DISPLAY"),
+        };
+        let output = command.output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), text)
+    };
+    let small = ["--size", "240x136", "--samples", "1"];
+    let with = |args: &[&str]| -> Vec<String> {
+        [&[scene.as_str()], &small[..], args].concat().iter().map(|s| s.to_string()).collect()
+    };
+    let call = |args: &[&str], display: Option<&str>| {
+        let args = with(args);
+        view(&args.iter().map(String::as_str).collect::<Vec<_>>(), display)
+    };
+    let (code, text) = call(&["--headless", "-o", &png, "--camera", "within"], None);
+    assert!(code == Some(0) && text.contains("trees"), "{text}");
+    // The window shows what is drawn without one.
+    let screen = Screen::start([640, 480]);
+    let line = ["--screenshot", &shot, "--camera", "within"];
+    let (code, text) = call(&line, Some(&screen.display()));
+    assert_eq!(code, Some(0), "{text}");
+    let [a, b] = [&png, &shot].map(|p| image::open(p).unwrap().into_rgb8());
+    assert!(a == b, "the window's picture is another");
+    // A rate that cannot be reached ends at coarse points; one that is easy, at fine ones.
+    let primitives = |rate: &str| {
+        let (code, text) = call(&["--bench", "flight", "--json", &json, "--fps", rate], None);
+        assert_eq!(code, Some(0), "{text}");
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+        assert_eq!(report["frames"], 60);
+        assert!(report["frame_ms"]["p99"].as_f64() >= report["frame_ms"]["p50"].as_f64());
+        report["primitives"]["p50"].as_f64().unwrap()
+    };
+    let (fast, slow) = (primitives("5000"), primitives("0.5"));
+    assert!(fast < 0.5 * slow, "{fast} against {slow}");
+    for (args, what) in [
+        (&["--headless", "-o", &png, "--camera", "moon"][..], "no camera is named moon"),
+        (&["--bench", "walk", "--json", &json], "no path is named walk"),
+        (&["--headless", "-o", &png, "--error", "0.05"], "--error needs a measured table"),
+    ] {
+        let (code, text) = call(args, None);
+        assert!(code == Some(1) && text.contains(what), "{text}");
+    }
+}
