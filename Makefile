@@ -82,13 +82,17 @@ demo: gpu
 	@for what in points views volume; do \
 	  target/release/forest-view $(OUT)/conifer.fpack --headless -o $(OUT)/view-$$what.png --as $$what \
 	    --view 25,12 --size 720x720 || exit 1; done
+	@target/release/forest-bake scene $(OUT)/conifer.fpack:height=16,weight=2 $(OUT)/broadleaf_young.fpack:height=12,weight=2 \
+	  $(OUT)/shrub.fpack:height=4 -o $(OUT)/forest.toml --trees 20000 --force
+	@target/release/forest-view $(OUT)/forest.toml --headless -o $(OUT)/forest.png --samples 2
 	@target/release/forest-bake levels sample-data/conifer.glb > $(OUT)/conifer-levels.txt
 	@target/release/forest-bake inspect $(OUT)/block.fpack
 	@echo; echo "Packs:    $(OUT)/*.fpack"; \
 	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together;"; \
 	echo "          conifer-views.png: from 289 directions; conifer-lookup.png: nearest, blended, through depth;"; \
 	echo "          conifer-volume.png: four levels of billboards; view-*.png: the viewer's)"; \
-	echo "Window:   target/release/forest-view $(OUT)/conifer.fpack"; \
+	echo "          forest.png: 20,000 of them on fractal land"; \
+	echo "Window:   target/release/forest-view $(OUT)/conifer.fpack, or $(OUT)/forest.toml"; \
 	echo "Export:   $(OUT)/conifer-three (for three.js)"; \
 	echo "Report:   $(OUT)/conifer-levels.txt (what each radius rule and order keeps, by level)"
 

@@ -41,9 +41,9 @@ pub(crate) struct Args {
     /// What to draw; default: auto if the pack has a measured table, else points, views or a volume.
     #[arg(long = "as", value_enum, value_name = "WHAT")]
     pub(crate) what: Option<Representation>,
-    /// s_m, smallest projected area of a point in square pixels.
-    #[arg(long, default_value_t = 1.0, value_name = "PX2", value_parser = positive)]
-    pub(crate) finest: f64,
+    /// s_m, smallest projected area of a point in square pixels; default: 1, of scenes 4.
+    #[arg(long, value_name = "PX2", value_parser = positive)]
+    pub(crate) finest: Option<f64>,
     /// s_M, largest projected area of a point: larger ones are drawn as triangles. Default: 16 times
     /// s_m.
     #[arg(long, value_name = "PX2", value_parser = not_negative)]

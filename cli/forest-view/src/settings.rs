@@ -32,7 +32,7 @@ pub(crate) struct Settings {
 
 impl Settings {
     pub(crate) fn new(args: &Args, model: &Model) -> Self {
-        let finest = args.finest;
+        let finest = args.finest.unwrap_or(1.0);
         Self {
             representation: args.what.unwrap_or_else(|| usual(model)),
             finest,

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use forest_gpu::{Gpu, instance};
 use forest_points::PixelArea;
 use forest_scene::Scene;
-use forest_soup::Camera;
+use forest_soup::{Camera, linear_to_srgb8};
 use forest_tests::landscapes::{Crop, Sources, flip, pictures};
 use forest_tests::report_trees;
 use forest_tests::reports::{load_soup, name_of, program};
@@ -20,6 +20,8 @@ use std::time::Instant;
 use table::{Percentiles, Row};
 
 const SIZE: [u32; 2] = [1280, 720];
+/// Of the README's picture.
+const SHOWN: [u32; 2] = [960, 480];
 const COUNTS: [u32; 5] = [1_000, 10_000, 100_000, 200_000, 1_000_000];
 /// Trees of others, where they are, and ours; their heights in metres and shares.
 const SHARED: [&str; 3] = ["sap_pine_20k.glb", "sap_birch_200k.glb", "ez_ash_medium.glb"];
@@ -59,8 +61,21 @@ fn main() -> Result<()> {
         let scene = Scene::open(&made(count, &packs, &out)?)?;
         measure(&gpu, &scene, &sources, &mut rows)?;
     }
+    show(&gpu, &root, &out)?;
     let names: Vec<String> = trees.iter().map(|t| name_of(t)).collect();
     table::write(&root, &gpu.name(), &names, &rows)
+}
+
+/// The README's picture of 200,000 trees.
+fn show(gpu: &Gpu, root: &Path, out: &Path) -> Result<()> {
+    let scene = Scene::open(&out.join("200000.toml"))?;
+    let camera = scene.file.camera(None).context("no camera")?.camera(&scene.land, SHOWN);
+    let mut ours = Ours::new(gpu, &scene, SHOWN, 3)?;
+    ours.frame(gpu, &camera)?;
+    let pixels = ours.picture(gpu)?;
+    let bytes = pixels.iter().flat_map(|p| p.map(linear_to_srgb8)).collect();
+    let picture = image::RgbImage::from_raw(SHOWN[0], SHOWN[1], bytes).context("a picture")?;
+    Ok(picture.save(root.join("docs/landscape.png"))?)
 }
 
 fn baked(tree: &Path, out: &Path) -> Result<PathBuf> {

@@ -66,13 +66,10 @@ fn sight<'s>(args: &Args, scene: &'s Scene) -> Result<&'s Sight> {
 
 /// How finely to draw.
 fn detail(args: &Args) -> LandscapeDetail {
-    let largest = args.largest.unwrap_or(args.finest * Thresholds::LARGEST_RATIO);
-    LandscapeDetail {
-        finest: PixelArea(args.finest),
-        largest: PixelArea(largest),
-        hidden: args.hidden,
-        ..LandscapeDetail::default()
-    }
+    let usual = LandscapeDetail::default();
+    let finest = args.finest.map_or(usual.finest, PixelArea);
+    let largest = args.largest.unwrap_or(finest.0 * Thresholds::LARGEST_RATIO);
+    LandscapeDetail { finest, largest: PixelArea(largest), hidden: args.hidden, ..usual }
 }
 
 /// How finely to draw, from picture to picture.

@@ -23,10 +23,10 @@ pub struct LandscapeDetail {
 }
 
 impl Default for LandscapeDetail {
-    /// Points of about a pixel, triangles above 16, ground within half a pixel.
+    /// Points of about two pixels by two, triangles above sixteen times that, ground within half a pixel.
     fn default() -> Self {
-        let finest = PixelArea(1.0);
-        Self { finest, largest: PixelArea(16.0), hidden: 2.0 / 3.0, ground: 0.5 }
+        let finest = PixelArea(4.0);
+        Self { finest, largest: PixelArea(64.0), hidden: 2.0 / 3.0, ground: 0.5 }
     }
 }
 

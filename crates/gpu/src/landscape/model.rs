@@ -83,8 +83,8 @@ impl<'s> Landscape<'s> {
     /// Uploads a scene, and makes its opacity maps for its sun and for the sky.
     ///
     /// # Errors
-    /// When a pack is damaged or lacks points, or the device does not take what is in it: prune packs
-    /// with `forest-bake needs`.
+    /// When a pack is damaged or lacks points, or the device does not take the points of all species in
+    /// one buffer.
     pub fn load(
         gpu: &Gpu,
         renderer: &LandscapeRenderer,
