@@ -5,6 +5,7 @@ use forest_gpu::{
     Gpu, Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Options,
     instance, read_samples,
 };
+use forest_points::PixelArea;
 use forest_scene::{Scene, Sight};
 use forest_soup::Camera;
 use forest_tests::landscapes::{Crop, Sources, averaged, flip, pictures};
@@ -152,7 +153,8 @@ fn the_picture_is_near_its_ground_truth() {
     let camera = scene.file.camera(None).unwrap().camera(&scene.land, [320, 180]);
     let truth = pictures(&scene, &sources, &camera, &CROPS, 4);
     let error = |hidden: f64| {
-        let detail = LandscapeDetail { hidden, ..LandscapeDetail::default() };
+        let (finest, largest) = (PixelArea(1.0), PixelArea(16.0));
+        let detail = LandscapeDetail { finest, largest, hidden, ..LandscapeDetail::default() };
         let drawn = draw(&gpu, &scene, &camera, &detail, false, 2);
         let crop = |c: &Crop| {
             let Crop { corner: [x, y], size: [w, h] } = *c;
@@ -268,4 +270,83 @@ fn the_program_draws_measures_and_steers() {
         let (code, text) = call(args, None);
         assert!(code == Some(1) && text.contains(what), "{text}");
     }
+}
+
+/// Bytes of a file.
+fn size_of(path: &Path) -> u64 {
+    std::fs::metadata(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).len()
+}
+
+#[test]
+fn pruned_packs_draw_the_same_frames_within_the_need() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let path = make(dir.path(), 300, &[]);
+    // From above the trees, 90 m away from the nearest.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (head, _) = text.split_once("[[camera]]").unwrap();
+    let camera = "[[camera]]\nname = \"high\"\nat = [0.0, 60.0]\nabove = 110.0\npitch = -50.0\n";
+    std::fs::write(&path, format!("{head}{camera}")).unwrap();
+    let folder = dir.path().join("lean");
+    let [scene, out] = [&path, &folder].map(|p| arg(p));
+    let same = ["--height", "180", "--finest", "1"];
+    let line = [&["needs", scene.as_str(), "-o", &out], &same[..]].concat();
+    let text = succeed(&line);
+    assert!(text.lines().count() == 3 && text.contains("points"), "{text}");
+    let whole = Scene::open(&path).unwrap();
+    let lean = Scene::open(&folder.join("forest.toml")).unwrap();
+    assert_eq!(whole.trees, lean.trees);
+    for (a, b) in whole.species.iter().zip(&lean.species) {
+        let [before, after] = [&a.pack, &b.pack].map(|p| size_of(p.path()));
+        assert!(after * 4 < before * 3, "{after} of {before} bytes");
+    }
+    let camera = whole.file.camera(None).unwrap().camera(&whole.land, [320, 180]);
+    let finest = PixelArea(1.0);
+    let largest = PixelArea(16.0);
+    for hidden in [0.0, 2.0 / 3.0] {
+        let detail = LandscapeDetail { finest, largest, hidden, ..LandscapeDetail::default() };
+        let [a, b] = [&whole, &lean].map(|s| draw(&gpu, s, &camera, &detail, false, 1));
+        assert!(a.pixels == b.pixels, "another frame, hidden {hidden}");
+        assert_eq!((a.counts.points, b.counts.beyond), (b.counts.points, 0));
+    }
+    // A camera among the trees asks for more, and is told.
+    let near = Sight { above: 6.0, pitch: 0.0, ..whole.file.camera(None).unwrap().clone() };
+    let near = near.camera(&whole.land, [320, 180]);
+    let detail = LandscapeDetail { finest, largest, ..LandscapeDetail::default() };
+    let [a, b] = [&whole, &lean].map(|s| draw(&gpu, s, &near, &detail, false, 1));
+    assert!(a.counts.beyond == 0 && b.counts.beyond > 0, "{:?}", b.counts);
+    // It is the same forest, in coarser points.
+    let [a, b] = [a, b].map(|d| mean(d.pixels.into_iter()));
+    assert!((0..3).all(|k| (a[k] - b[k]).abs() < 0.05), "{a:?} {b:?}");
+    let again = run(&line);
+    assert!(again.0 == 1 && again.2.contains("is there already; --force"), "{again:?}");
+}
+
+#[test]
+fn a_pruned_pack_is_drawn_as_the_whole_one_from_its_nearest_distance_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = arg(&dir.path().join("lean"));
+    let pack = arg(&packs()[1]);
+    let name = packs()[1].file_name().unwrap().to_string_lossy().into_owned();
+    // The broadleaf tree is some 6 units high: as parallel pictures of 64 pixels have it from 11 on.
+    let line = ["needs", &pack, "-o", &folder, "--nearest", "11m", "--height", "64", "--fov", "35"];
+    let text = succeed(&[&line[..], &["--json"]].concat());
+    let rows: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let bytes = rows[0]["bytes"].as_array().unwrap();
+    assert!(bytes[1].as_u64().unwrap() * 2 < bytes[0].as_u64().unwrap(), "{rows}");
+    let lean = arg(&dir.path().join("lean").join(name));
+    succeed(&["verify", &lean, "-q"]);
+    let [a, b] = ["a.png", "b.png"].map(|n| arg(&dir.path().join(n)));
+    let draw = |pack: &str, png: &str, size: &str| {
+        let (code, _, err) =
+            run(&["draw", pack, "-o", png, "--size", size, "--view", "40,20", "--finest", "1"]);
+        assert_eq!(code, 0, "{err}");
+        err
+    };
+    let (whole, pruned) = (draw(&pack, &a, "48"), draw(&lean, &b, "48"));
+    assert!(!whole.contains("pruned") && !pruned.contains("pruned"), "{pruned}");
+    assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap());
+    let pruned = draw(&lean, &b, "512");
+    assert!(pruned.contains("pruned; has no points of 1 px² here"), "{pruned}");
+    let (code, _, err) = run(&["needs", &pack, "-o", &folder]);
+    assert!(code == 1 && err.contains("packs need --nearest"), "{err}");
 }

@@ -161,6 +161,12 @@ fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resu
     let mut pictures = Vec::new();
     for thresholds in args.levels(pack, &block, &camera, quiet)? {
         let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, style);
+        if !quiet && block.is_beyond(&camera, &thresholds) {
+            let (name, finest) = (pack.path().display(), thresholds.finest.0);
+            eprintln!(
+                "warning: {name}: pruned; has no points of {finest} px² here, the finest are drawn"
+            );
+        }
         if !quiet {
             eprintln!(
                 "s_m {} px²: {} points, {} triangles, coverage {:.4}",

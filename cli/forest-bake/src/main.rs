@@ -8,6 +8,7 @@ mod failure;
 mod inspect;
 mod levels;
 mod light;
+mod needs;
 mod output;
 mod points;
 mod scene;
@@ -51,6 +52,8 @@ enum Command {
     Export(export::Args),
     /// Make a landscape of packs, or plant the trees of a scene file anew.
     Scene(scene::Args),
+    /// Write packs that hold only what a scene, or a nearest distance, needs.
+    Needs(needs::Args),
     /// Draw a picture of a pack, at one or several levels of detail.
     Draw(draw::Args),
     /// Judge a pack against its source: error by cost, view and distance, beside other ways.
@@ -94,6 +97,7 @@ fn run(args: Args) -> anyhow::Result<()> {
         Command::Capture(a) => capture::run(&a, quiet),
         Command::Export(a) => export::run(&a, quiet),
         Command::Scene(a) => scene::run(&a, quiet),
+        Command::Needs(a) => needs::run(&a),
         Command::Draw(a) => draw::run(&a, quiet),
         Command::Eval(a) => eval::run(&a, quiet),
         Command::Inspect(a) => inspect::run(&a),

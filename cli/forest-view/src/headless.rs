@@ -7,7 +7,7 @@ use crate::settings::{Settings, check};
 use crate::truth::Truth;
 use anyhow::{Context, Result};
 use forest_gpu::{
-    Costs, Frame, Gpu, Layer, Look, Model, Options, Renderer, candidates, read_picture,
+    Costs, Frame, Gpu, Layer, Look, Model, Options, Renderer, What, candidates, read_picture,
 };
 use forest_pack::Pack;
 use forest_soup::Camera;
@@ -34,6 +34,14 @@ pub(crate) fn run(args: &Args, gpu: &Gpu, pack: &Pack, angles: [f64; 2]) -> Resu
     let what = settings.what(&model, &camera, &all, None).context("nothing was measured")?;
     let layers = [Layer::whole(what)];
     let frame = Frame { camera, light: settings.light, layers: &layers };
+    if let (What::Points(thresholds), Some(points), false) = (&what, model.points(), args.quiet)
+        && points.is_beyond(&camera, thresholds)
+    {
+        let (name, finest) = (pack.path().display(), thresholds.finest.0);
+        eprintln!(
+            "warning: {name}: pruned; has no points of {finest} px² here, the finest are drawn"
+        );
+    }
     let drawn = renderer.render(gpu, &mut model, &target, &frame, None)?;
     gpu.finish()?;
     let truth = match &args.truth {

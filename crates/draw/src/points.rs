@@ -123,7 +123,10 @@ pub fn point_ellipses(
     let ellipses = |c: &CellCut| -> Vec<Ellipse> {
         c.drawn_points(block)
             .filter(|(id, _, _)| keep(*id))
-            .filter_map(|(id, cell, p)| ellipse(block, &projector, camera, style, id, cell, p))
+            .filter_map(|(id, cell, p)| {
+                let number = id.wrapping_add(block.point_offset(c.cell));
+                ellipse(block, &projector, camera, style, number, cell, p)
+            })
             .collect()
     };
     cut.cells.par_iter().flat_map_iter(ellipses).collect()
@@ -181,10 +184,10 @@ fn triangles<'s>(
     list: &mut DisplayList<'s>,
 ) {
     let projector = Projector::new(camera, near(block));
-    // Points and triangles have different numbers for the hash rule (SPEC.md, section 5.4).
-    let first_id = block.points.len() as u32;
     for c in &cut.cells {
         let cell = &block.cells[c.cell as usize];
+        // Points and triangles have different numbers for the hash rule (SPEC.md, section 5.4).
+        let first_id = block.triangle_offset(c.cell);
         for i in c.triangles.clone() {
             let t = &block.triangles[i as usize];
             let corners = corners(block, cell, i as usize, t, style);

@@ -174,6 +174,8 @@ impl<'p> PointsModel<'p> {
                     fine: code(cut.fine),
                     coarse: code(cut.coarse),
                     fade,
+                    first_point: block.point_offset(cut.cell),
+                    first_triangle: block.triangle_offset(cut.cell),
                     ..cell_uniform(block, record, camera)
                 });
                 for first in cut.points.clone().step_by(CHUNK as usize) {
@@ -235,8 +237,7 @@ fn cell_uniform(block: &PointsBlock, cell: &CellRecord, camera: &Camera) -> Cell
         size: 1.0,
         radii: 0,
         first_point: 0,
-        // Points and triangles have different numbers for the hash rule.
-        first_triangle: block.points.len() as u32,
+        first_triangle: 0,
         mask: 0,
         clump: 0.0,
         cut: f32::NEG_INFINITY,

@@ -2,6 +2,7 @@
 
 use crate::calibration::Calibration;
 use crate::header::{CellRecord, PointsHeader};
+use crate::pruned::Pruned;
 use crate::record::PointRecord;
 use crate::size::SizeCode;
 use crate::triangle::TriangleRecord;
@@ -25,6 +26,8 @@ pub struct PointsBlock<'a> {
     pub triangle_colors: &'a [[[u8; 4]; 3]],
     /// Measured factors on areas, if the pack has them.
     pub calibration: Option<Calibration>,
+    /// What is left out, if the pack is pruned.
+    pub pruned: Option<Pruned>,
 }
 
 impl<'a> PointsBlock<'a> {

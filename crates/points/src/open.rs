@@ -2,6 +2,7 @@
 
 use crate::block::PointsBlock;
 use crate::calibration::Calibration;
+use crate::pruned::Pruned;
 use crate::validate::validate;
 use forest_pack::{Pack, PackError, SectionId, header, kind};
 
@@ -20,6 +21,7 @@ impl<'a> PointsBlock<'a> {
             triangles: if pack.contains(triangles) { pack.records(triangles)? } else { &[] },
             triangle_colors: if pack.contains(colors) { pack.records(colors)? } else { &[] },
             calibration: Calibration::read(pack)?,
+            pruned: Pruned::read(pack)?,
         };
         validate(&block).map_err(|(kind, problem)| {
             PackError::invalid(pack.path(), SectionId::new(kind, 0), problem)

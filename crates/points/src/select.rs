@@ -7,6 +7,7 @@
 //! * a surfel is drawn iff `parent > fine` and `own ≤ coarse`;
 //! * a cluster's point is drawn iff `parent > fine` and `own ≤ fine`.
 //!
+//! In a pruned pack both codes are raised to its limits: what is finer is not there.
 //! In a pack without triangles `coarse` is the largest size: all surfels may be drawn.
 //!
 //! Sizes grow towards the root, and a triangle has the size of its surfels, so that for any
@@ -150,7 +151,8 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
         if area == f64::INFINITY { area } else { area.max(0.0) / (pixels * pixels) }
     };
     let d1 = distance(block.origin());
-    let block_fine = code(SizeCode::at_most(to_block(t.finest.0, d1)));
+    let [least_fine, least_coarse] = block.limits();
+    let block_fine = code(SizeCode::at_most(to_block(t.finest.0, d1))).max(least_fine);
     for (i, cell) in (0..).zip(block.cells) {
         let [x, y, z] = cell.center.map(f64::from);
         let d2 = distance(block.to_world(DVec3::new(x, y, z)));
@@ -167,14 +169,14 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
         let coarse = if exact && block.triangles.is_empty() {
             i32::from(SizeCode::MAX.bits())
         } else {
-            code(SizeCode::at_most(coarse_area))
+            code(SizeCode::at_most(coarse_area)).max(least_coarse)
         };
         let (fine, points) = match block.header.order {
             Order::Exact => {
                 let fine = if cell.is_top() {
                     block_fine
                 } else {
-                    code(SizeCode::at_most(fine_area)).min(root_parent - 1)
+                    code(SizeCode::at_most(fine_area)).max(least_fine).min(root_parent - 1)
                 };
                 (fine, exact_range(block, cell, fine))
             }

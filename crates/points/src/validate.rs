@@ -27,6 +27,9 @@ pub(crate) const SMALLEST_SURFEL: f64 = 1.0 / 65_536.0;
 pub fn validate(block: &PointsBlock) -> Result<(), (u16, String)> {
     header(block)?;
     cells(block)?;
+    if let Some(pruned) = &block.pruned {
+        pruned.validate(block).map_err(|problem| (kind::POINTS_PRUNED, problem))?;
+    }
     for (i, cell) in block.cells.iter().enumerate() {
         points(block, i, cell)?;
         triangles(block, i, cell)?;
@@ -134,7 +137,8 @@ fn cells(block: &PointsBlock) -> Result<(), Broken> {
     }
     top_cell(block, top, cells).map_err(|problem| (kind::POINTS_CELLS, problem))?;
     let (stored, kept) = (block.triangles.len() as u64, block.header.counts.triangles());
-    if stored != 0 && stored != kept {
+    let fits = if block.pruned.is_some() { stored <= kept } else { stored == kept };
+    if stored != 0 && !fits {
         let problem = format!("{stored} triangles; the header's counts leave {kept}");
         return Err((kind::POINTS_TRIANGLES, problem));
     }

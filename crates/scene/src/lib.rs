@@ -4,6 +4,7 @@
 //! * [`Scatter`] plants trees on it: a table of [`Instance`]s, 16 bytes each, in a file of its own.
 //! * [`Scene`] is what a scene file ([`SceneFile`], TOML) names, opened.
 //! * [`OpacityMap`] says how much light reaches a place between the trees.
+//! * [`points_needs`] says what its cameras can ever ask of each pack.
 //!
 //! Nothing is drawn here: that is `forest-gpu`'s, with ground truth from `forest-raster`.
 //!
@@ -31,6 +32,7 @@ mod ground;
 mod heightmap;
 pub mod instances;
 mod land;
+mod need;
 mod scatter;
 mod scene;
 mod shade;
@@ -47,6 +49,7 @@ pub use ground::{Ground, PATCH, Patch, is_beside};
 pub use heightmap::Grey;
 pub use instances::{Instance, MOST_SPECIES, TILE, Tile};
 pub use land::{Land, MOST_POINTS};
+pub use need::points_needs;
 pub use scatter::{MOST_TREES, Scatter};
 pub use scene::{Scene, open_land, plant, read_file, write_file};
 pub use shade::{Casters, DEPTH_STEPS, DIFFUSE, LOWEST_LIGHT, OpacityMap, Texel};

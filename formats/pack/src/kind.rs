@@ -16,6 +16,8 @@ pub const POINTS_TRIANGLES: u16 = 19;
 pub const POINTS_TRIANGLE_COLORS: u16 = 20;
 /// Factors on the areas of points by size: 53 single-precision numbers.
 pub const POINTS_CALIBRATION: u16 = 21;
+/// What a pruned pack leaves out.
+pub const POINTS_PRUNED: u16 = 22;
 /// Materials and the list of textures: [`crate::header::Materials`].
 pub const MATERIALS: u16 = 32;
 /// Texels of one texture, RGBA, 8 bits each; the index is the texture's number.
@@ -60,6 +62,7 @@ pub fn name(kind: u16) -> String {
         POINTS_TRIANGLES => "points.triangles".into(),
         POINTS_TRIANGLE_COLORS => "points.triangle-colors".into(),
         POINTS_CALIBRATION => "points.calibration".into(),
+        POINTS_PRUNED => "points.pruned".into(),
         MATERIALS => "materials".into(),
         TEXTURE => "texture".into(),
         VIEWS_HEADER => "views.header".into(),

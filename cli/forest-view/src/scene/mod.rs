@@ -125,11 +125,16 @@ impl Goal {
 
 /// What a picture took, in words.
 fn describe(drawn: &LandscapeDrawn) -> String {
-    let LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out } = drawn;
-    let rest = match left_out {
-        0 => String::new(),
-        n => format!("; NO ROOM for {n} runs"),
-    };
+    let LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out, beyond } = drawn;
+    let mut rest = String::new();
+    if *left_out > 0 {
+        rest += &format!("; NO ROOM for {left_out} runs");
+    }
+    if *beyond > 0 {
+        rest += &format!(
+            "; {beyond} trees and cells ask for finer points than their pruned packs have"
+        );
+    }
     format!(
         "{trees} of {looked_at} trees, {points} points, {triangles} triangles, {ground} of ground{rest}"
     )

@@ -45,6 +45,8 @@ pub struct LandscapeDrawn {
     pub ground: u64,
     /// What found no room: 0, or the picture lacks something.
     pub left_out: u64,
+    /// Trees and cells whose pruned packs have nothing as fine as was asked for.
+    pub beyond: u64,
 }
 
 impl LandscapeDrawn {

@@ -29,7 +29,7 @@ const MOST_LARGE: u64 = 1 << 18;
 const MOST_RUNS: u32 = 1 << 15;
 
 /// Words of `Work` before its list.
-pub(crate) const WORK_HEAD: usize = 8;
+pub(crate) const WORK_HEAD: usize = 12;
 
 /// `Patch` of ground.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -243,9 +243,10 @@ impl<'s> Landscape<'s> {
         let bytes = crate::timer::read(gpu, &self.counted)?;
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
         let ground = u64::from(self.patch_count * 2 * PATCH * PATCH);
-        let [trees, points, triangles, left_out] = [4, 5, 6, 7].map(|i| u64::from(words[i]));
+        let [trees, points, triangles, left_out, beyond] =
+            [4, 5, 6, 7, 8].map(|i| u64::from(words[i]));
         let looked_at = self.bands.trees;
-        Ok(LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out })
+        Ok(LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out, beyond })
     }
 
     /// Chooses tiles and patches, and uploads what a frame needs.

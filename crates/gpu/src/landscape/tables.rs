@@ -23,13 +23,13 @@ pub(crate) struct SpeciesRecord {
     has_triangles: u32,
     unit: f32,
     first_triangle: u32,
-    triangle_number: u32,
+    least_fine: i32,
     pub(crate) first_run: u32,
     pub(crate) runs: u32,
     clump: f32,
     wide: f32,
     tall: f32,
-    zero: f32,
+    least_coarse: i32,
 }
 
 /// `Stock` of trees.wgsl.
@@ -87,9 +87,10 @@ impl Tables {
         let first_triangle = self.triangle_sizes.len() as u32;
         let first_cell = self.stocks.len() as u32;
         let unit = stance.unit;
-        for cell in block.cells {
-            self.stocks.push(stock(block, cell, stance, self.points));
+        for (i, cell) in (0..).zip(block.cells) {
+            self.stocks.push(stock(block, [i, self.points], cell, stance));
         }
+        let [least_fine, least_coarse] = block.limits();
         // The block's own tree is the last cell.
         let top = block.cells.last().map_or(&[][..], |c| block.cell_points(c));
         let radius = |code| (block.radius_of(code) * block.scale()) as f32;
@@ -115,20 +116,26 @@ impl Tables {
             has_triangles: (!block.triangles.is_empty()).into(),
             unit: unit as f32,
             first_triangle,
-            triangle_number: 0,
+            least_fine,
             first_run: 0,
             runs: 0,
             clump: canopy.clump() as f32,
             wide: ((max - min).with_y(0.0).length() * 0.5) as f32,
             tall: ((max.y - min.y) * 0.5) as f32,
-            zero: 0.0,
+            least_coarse,
         });
         self.points += block.points.len() as u32;
         Ok(())
     }
 }
 
-fn stock(block: &PointsBlock, cell: &CellRecord, stance: &Stance, first: u32) -> StockRecord {
+/// Cell number `index` of a block whose first point is number `first` of all.
+fn stock(
+    block: &PointsBlock,
+    [index, first]: [u32; 2],
+    cell: &CellRecord,
+    stance: &Stance,
+) -> StockRecord {
     let from_foot = |world: DVec3| ((world - stance.anchor) * stance.unit).as_vec3().to_array();
     let center = DVec3::from_array(cell.center.map(f64::from));
     let metres = block.scale() * stance.unit;
@@ -140,11 +147,11 @@ fn stock(block: &PointsBlock, cell: &CellRecord, stance: &Stance, first: u32) ->
         first_point: cell.first_point + first,
         points: cell.points,
         // Numbers are those of the block alone, whatever was uploaded before it.
-        number: first.wrapping_neg(),
+        number: block.point_offset(index).wrapping_sub(first),
         root_parent: cell.root_parent.into(),
         first_triangle: cell.first_triangle,
         triangles: cell.triangles,
         is_top: cell.is_top().into(),
-        triangle_number: block.points.len() as u32,
+        triangle_number: block.triangle_offset(index),
     }
 }

@@ -62,7 +62,7 @@ fn cull(
         return;
     }
     let unit = pixels(t, s.block_unit, length(place_of(t, s.origin)));
-    let fine = code_at_most(finest_seen(share * visible.y) / (unit * unit));
+    let fine = there(code_at_most(finest_seen(share * visible.y) / (unit * unit)), s.least_fine);
     if fine < s.root_parent {
         if RUN == 0u {
             let slot = atomicAdd(&work.near, 1u);
@@ -250,9 +250,9 @@ fn choose(
         share *= through;
         let here = pixels(t, s.block_unit, length(center));
         let finest = finest_seen(share);
-        let code = code_at_most(finest / (here * here));
+        let code = there(code_at_most(finest / (here * here)), s.least_fine);
         let fine = select(min(code, stock.root_parent - 1), block_fine, is_top);
-        let largest = code_at_most(max(land.largest, finest) / (here * here));
+        let largest = there(code_at_most(max(land.largest, finest) / (here * here)), s.least_coarse);
         let coarse = select(4094, largest, s.has_triangles != 0u);
         var count = 0u;
         if fine >= 0 || coarse >= 0 {

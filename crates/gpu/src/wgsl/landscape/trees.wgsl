@@ -22,9 +22,10 @@ struct Species {
     has_triangles: u32,
     // Metres of a unit of radii.
     unit: f32,
-    // Its triangles in `triangle_sizes`, and the number of the first one for the hash rule.
+    // Its triangles in `triangle_sizes`.
     first_triangle: u32,
-    triangle_number: u32,
+    // Of a pruned pack, codes below which nothing is there; −1.
+    least_fine: i32,
     // Its runs of triangles, and how many there is room for.
     first_run: u32,
     runs: u32,
@@ -33,7 +34,7 @@ struct Species {
     // Radius of the upright cylinder about `center` that holds a tree, and half its height.
     wide: f32,
     tall: f32,
-    zero: f32,
+    least_coarse: i32,
 }
 
 // A cell of a species, in metres from the foot of a tree of scale 1.
@@ -76,6 +77,11 @@ struct Work {
     points: atomic<u32>,
     triangles: atomic<u32>,
     left_out: atomic<u32>,
+    // Trees and cells that ask for more than their pruned packs have.
+    beyond: atomic<u32>,
+    zero0: u32,
+    zero1: u32,
+    zero2: u32,
     // Trees whose cells are chosen one by one, and largest size codes of their blocks' own trees.
     trees_near: array<vec2u>,
 }
@@ -170,6 +176,14 @@ fn finest_seen(share: f32) -> f32 {
 fn code_at_most(area: f32) -> i32 {
     let position = 4095.0 - (SIZE_TOP - log2(area)) * SIZES_PER_OCTAVE;
     return i32(clamp(floor(position), -1.0, 4094.0));
+}
+
+// A code that is not below what a pruned pack has.
+fn there(code: i32, least: i32) -> i32 {
+    if code < least && RUN == 0u {
+        atomicAdd(&work.beyond, 1u);
+    }
+    return max(code, least);
 }
 
 // Pixels of a block unit at a distance.

@@ -1,0 +1,188 @@
+//! `forest-bake needs`.
+
+use crate::failure::Usage;
+use crate::output;
+use anyhow::{Context, Result};
+use forest_pack::{Pack, PackWriter, SectionId, kind};
+use forest_points::{PointsBlock, PointsNeed, PruneReport, Thresholds, prune};
+use forest_scene::{Scene, points_needs, write_file};
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Work out what a scene's cameras, or any from a nearest distance, can ever draw of packs, and write
+/// packs without the rest. From there their pictures are those of the whole packs, sample by sample.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// One scene file (.toml), or packs with --nearest.
+    #[arg(required = true, value_name = "SCENE|PACK")]
+    inputs: Vec<PathBuf>,
+    /// Folder to write packs to, and the scene file that names them; it is made if need be.
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Packs: distance of the eye from the tree's box at least, in world units of the pack, or as 3m, 4km.
+    #[arg(long, value_name = "DISTANCE", value_parser = distance)]
+    nearest: Option<f64>,
+    /// Height of pictures in pixels.
+    #[arg(long, default_value_t = 1080, value_name = "PX")]
+    height: u32,
+    /// Packs: height of pictures in degrees, at least. (Cameras of scenes have their own.)
+    #[arg(long, default_value_t = 45.0, value_name = "DEGREES")]
+    fov: f64,
+    /// s_m, smallest projected area of a point that is asked for, in square pixels.
+    #[arg(long, default_value_t = 1.0, value_name = "PX2")]
+    finest: f64,
+    /// s_M that is asked for; default: 16 times s_m.
+    #[arg(long, value_name = "PX2")]
+    largest: Option<f64>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    /// Replace packs in the folder.
+    #[arg(long)]
+    force: bool,
+}
+
+/// What became of a pack.
+#[derive(Serialize)]
+struct Row {
+    pack: String,
+    bytes: [u64; 2],
+    #[serde(flatten)]
+    kept: PruneReport,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let thresholds = thresholds(args)?;
+    std::fs::create_dir_all(&args.output).with_context(|| args.output.display().to_string())?;
+    let rows = match &args.inputs[..] {
+        [scene] if scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) => {
+            of_scene(args, scene, thresholds)?
+        }
+        packs => of_packs(args, packs, thresholds)?,
+    };
+    let text = match args.json {
+        true => format!("{}\n", serde_json::to_string_pretty(&rows)?),
+        false => table(&rows)?,
+    };
+    Ok(output::print(&text)?)
+}
+
+fn thresholds(args: &Args) -> Result<[f64; 2]> {
+    let largest = args.largest.unwrap_or(args.finest * Thresholds::LARGEST_RATIO);
+    let sound = |v: f64| v.is_finite() && v >= 0.0;
+    if !(sound(args.finest) && sound(largest) && largest >= args.finest) {
+        let text = format!("--finest {} --largest {largest}: not areas", args.finest);
+        return Err(Usage(format!("{text}, the first the smaller")).into());
+    }
+    if !(0.1..=170.0).contains(&args.fov) || args.height == 0 {
+        return Err(Usage("--fov must be within 0.1 and 170, --height above 0".into()).into());
+    }
+    Ok([args.finest, largest])
+}
+
+/// Prunes all packs of a scene, and writes the scene anew. Landscapes are drawn of points: views and
+/// volumes are left out.
+fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Vec<Row>> {
+    let scene = Scene::open(path)?;
+    let needs = points_needs(&scene, args.height, thresholds);
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let whole = |p: &PathBuf| std::path::absolute(folder.join(p)).unwrap_or_else(|_| p.clone());
+    let mut file = scene.file.clone();
+    file.land.heightmap.iter_mut().for_each(|m| m.file = whole(&m.file));
+    file.forest.density = file.forest.density.as_ref().map(whole);
+    file.forest.instances = file.forest.instances.as_ref().map(whole);
+    let mut rows = Vec::new();
+    for (i, (species, need)) in scene.species.iter().zip(&needs).enumerate() {
+        let stem = species.pack.path().file_name().context("a pack without a name")?;
+        let name = format!("{i}-{}", stem.to_string_lossy());
+        rows.push(write(args, &species.pack, &name, need, &|k| k < kind::VIEWS_HEADER)?);
+        file.species[i].pack = PathBuf::from(name);
+        // As the whole pack has it: its box stays, but be sure.
+        file.species[i].anchor = Some(species.stance.anchor.to_array());
+    }
+    let name = path.file_name().context("a scene without a name")?;
+    write_file(&args.output.join(name), &file)?;
+    Ok(rows)
+}
+
+fn of_packs(args: &Args, packs: &[PathBuf], [finest, largest]: [f64; 2]) -> Result<Vec<Row>> {
+    let nearest = args.nearest.ok_or_else(|| Usage("packs need --nearest".into()))?;
+    let tall = 2.0 * (args.fov.to_radians() * 0.5).tan() * nearest;
+    let pixels = f64::from(args.height) / tall;
+    let area = |px: f64| px / (pixels * pixels);
+    let need = PointsNeed { finest: area(finest), largest: area(largest) };
+    let one = |path: &PathBuf| {
+        let pack = Pack::open(path)?;
+        let name = path.file_name().context("a pack without a name")?.to_string_lossy();
+        write(args, &pack, &name, &need, &|_| true)
+    };
+    packs.iter().map(one).collect()
+}
+
+/// Writes a pruned pack; of sections that are not of points those whose kind is wanted.
+fn write(
+    args: &Args,
+    pack: &Pack,
+    name: &str,
+    need: &PointsNeed,
+    wanted: &dyn Fn(u16) -> bool,
+) -> Result<Row> {
+    let target = args.output.join(name);
+    if target.exists() && !args.force {
+        let text = format!("{}: is there already; --force", target.display());
+        return Err(Usage(text).into());
+    }
+    let block = PointsBlock::open(pack)?;
+    let mut writer = PackWriter::create(&target)?;
+    let kept = prune(pack, &block, need, &mut writer)?;
+    let own = |id: &SectionId| (kind::POINTS_HEADER..kind::VIEWS_HEADER).contains(&id.kind);
+    for (id, _) in pack.sections().filter(|(id, _)| !own(id) && wanted(id.kind)) {
+        writer.copy(pack, id)?;
+    }
+    writer.finish()?;
+    let bytes = [pack.file_length(), std::fs::metadata(&target)?.len()];
+    Ok(Row { pack: target.display().to_string(), bytes, kept })
+}
+
+fn table(rows: &[Row]) -> Result<String, std::fmt::Error> {
+    let mut text = String::new();
+    for r in rows {
+        let part =
+            |[all, kept]: [u64; 2]| format!("{} of {}", output::count(kept), output::count(all));
+        let [before, after] = r.bytes;
+        writeln!(
+            text,
+            "{}: {} of {}; points {}, triangles {}",
+            r.pack,
+            output::bytes(after),
+            output::bytes(before),
+            part(r.kept.points),
+            part(r.kept.triangles)
+        )?;
+    }
+    Ok(text)
+}
+
+/// "3", "3m", "4km".
+fn distance(text: &str) -> Result<f64, String> {
+    let (number, unit) = match (text.strip_suffix("km"), text.strip_suffix('m')) {
+        (Some(n), _) => (n, 1000.0),
+        (None, Some(n)) => (n, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    match number.trim().parse::<f64>() {
+        Ok(v) if v > 0.0 && v.is_finite() => Ok(v * unit),
+        _ => Err("a distance above 0, as 3, 3m or 4km".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn distances_have_units() {
+        let of = super::distance;
+        assert_eq!((of("3"), of("2.5m"), of("4km")), (Ok(3.0), Ok(2.5), Ok(4000.0)));
+        assert!(of("-1m").is_err() && of("far").is_err());
+    }
+}
