@@ -7,10 +7,11 @@ use forest_gpu::{
 };
 use forest_points::PixelArea;
 use forest_scene::{Scene, Sight};
-use forest_soup::Camera;
-use forest_tests::landscapes::{Crop, Sources, averaged, flip, pictures};
+use forest_soup::{Camera, Projection};
+use forest_tests::landscapes::{Crop, Sources, averaged, brightness, flip, pictures};
 use forest_tests::reports::load_soup;
 use forest_tests::screen::Screen;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
@@ -32,11 +33,32 @@ fn packs() -> &'static [PathBuf] {
     &PACKS.1
 }
 
+/// The same with views.
+fn packs_with_views() -> &'static [PathBuf] {
+    static PACKS: LazyLock<(tempfile::TempDir, Vec<PathBuf>)> = LazyLock::new(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let bake = |(tree, pack): (&&str, &PathBuf)| {
+            let both = dir.path().join(tree).with_extension("fpack");
+            std::fs::copy(pack, &both).unwrap();
+            let from = arg(&repo("sample-data").join(tree));
+            succeed(&["views", &from, "-o", &arg(&both), "--texels", "64", "-q"]);
+            both
+        };
+        let packs = TREES.iter().zip(packs()).map(bake).collect();
+        (dir, packs)
+    });
+    &PACKS.1
+}
+
 /// Makes a scene of the sample trees, each as high as a tree.
 fn make(folder: &Path, trees: u32, more: &[&str]) -> PathBuf {
+    make_of(packs(), folder, trees, more)
+}
+
+fn make_of(packs: &[PathBuf], folder: &Path, trees: u32, more: &[&str]) -> PathBuf {
     let path = folder.join("forest.toml");
     let heights = ["height=14", "height=11,weight=2", "height=5,weight=0.5"];
-    let packs = packs().iter().zip(heights).map(|(p, h)| format!("{}:{h}", p.display()));
+    let packs = packs.iter().zip(heights).map(|(p, h)| format!("{}:{h}", p.display()));
     let packs: Vec<String> = packs.collect();
     let (count, output) = (trees.to_string(), arg(&path));
     let mut args = vec!["scene"];
@@ -144,23 +166,24 @@ fn wrong_scenes_are_refused_by_name() {
 const CROPS: [Crop; 2] =
     [Crop { corner: [20, 70], size: [96, 54] }, Crop { corner: [180, 110], size: [96, 54] }];
 
+/// The pixels of a crop in a picture of this width.
+fn inside(crop: &Crop, width: u32) -> impl Iterator<Item = usize> {
+    let Crop { corner: [x, y], size: [w, h] } = *crop;
+    (0..w * h).map(move |i| ((y + i / w) * width + x + i % w) as usize)
+}
+
 #[test]
 fn the_picture_is_near_its_ground_truth() {
     let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
     let scene = Scene::open(&make(dir.path(), 600, &[])).unwrap();
-    let soups = TREES.iter().map(|t| load_soup(&repo("sample-data").join(t)).unwrap());
-    let sources = Sources::new(soups.collect());
+    let sources = sources();
     let camera = scene.file.camera(None).unwrap().camera(&scene.land, [320, 180]);
     let truth = pictures(&scene, &sources, &camera, &CROPS, 4);
     let error = |hidden: f64| {
         let (finest, largest) = (PixelArea(1.0), PixelArea(16.0));
         let detail = LandscapeDetail { finest, largest, hidden, ..LandscapeDetail::default() };
         let drawn = draw(&gpu, &scene, &camera, &detail, false, 2);
-        let crop = |c: &Crop| {
-            let Crop { corner: [x, y], size: [w, h] } = *c;
-            (0..w * h).map(move |i| ((y + i / w) * 320 + x + i % w) as usize)
-        };
-        let ours = mean(CROPS.iter().flat_map(crop).map(|i| drawn.pixels[i]));
+        let ours = mean(CROPS.iter().flat_map(|c| inside(c, 320)).map(|i| drawn.pixels[i]));
         (flip(&drawn.pixels, 320, &CROPS, &truth), ours, drawn.counts)
     };
     let theirs = mean(truth.iter().flat_map(|t| &t.pixels).map(|p| [p[0], p[1], p[2]]));
@@ -174,6 +197,93 @@ fn the_picture_is_near_its_ground_truth() {
     let (less, _, fewer) = error(2.0 / 3.0);
     assert!(less < all + 0.02, "{less} against {all}");
     assert!(fewer.points < counts.points * 9 / 10, "{} of {}", fewer.points, counts.points);
+}
+
+fn sources() -> Sources {
+    let soups = TREES.iter().map(|t| load_soup(&repo("sample-data").join(t)).unwrap());
+    Sources::new(soups.collect())
+}
+
+#[test]
+fn far_trees_are_drawn_by_views_and_are_as_near_the_truth() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make_of(packs_with_views(), dir.path(), 600, &[])).unwrap();
+    let camera = scene.file.camera(None).unwrap().camera(&scene.land, [320, 180]);
+    let truth = pictures(&scene, &sources(), &camera, &CROPS, 4);
+    let usual = LandscapeDetail { finest: PixelArea(2.0), ..LandscapeDetail::default() };
+    let with = |impostors: f64| {
+        let detail = LandscapeDetail { impostors, ..usual };
+        let drawn = draw(&gpu, &scene, &camera, &detail, false, 2);
+        let error = flip(&drawn.pixels, 320, &CROPS, &truth);
+        (error, brightness(&drawn.pixels, 320, &CROPS, &truth), drawn.counts)
+    };
+    let (points, _, all) = with(0.0);
+    let (views, bright, less) = with(1.0);
+    assert!(all.impostors == 0 && less.impostors * 2 > less.trees, "{less:?}");
+    assert!(less.points * 2 < all.points, "{less:?} {all:?}");
+    assert!(views < points + 0.02, "{views} against {points}");
+    assert!((0.8..1.25).contains(&bright), "{bright}");
+}
+
+#[test]
+fn views_and_points_of_a_tree_share_its_samples() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let mut scene = Scene::open(&make_of(packs_with_views(), dir.path(), 100, &[])).unwrap();
+    scene.trees.retain(|t| t.species() == 1);
+    scene.trees.truncate(1);
+    let camera = alone(&scene, 60.0, 0.2);
+    let with = |impostors: f64| {
+        let usual = LandscapeDetail { hidden: 0.0, ..LandscapeDetail::default() };
+        draw(&gpu, &scene, &camera, &LandscapeDetail { impostors, ..usual }, false, 1)
+    };
+    let [points, views] = [0.0, 100.0].map(with);
+    assert_eq!((points.counts.impostors, views.counts.points), (0, 0));
+    // At some size both draw; each sample is that of one of them.
+    let mut mixed = 0;
+    for k in 1..60 {
+        let both = with(0.02 * f64::from(k));
+        if both.counts.impostors == 0 || both.counts.points == 0 {
+            continue;
+        }
+        let (mut from_points, mut from_views) = (0, 0);
+        for ((p, v), b) in points.pixels.iter().zip(&views.pixels).zip(&both.pixels) {
+            assert!(b == p || b == v, "{b:?} is neither {p:?} nor {v:?}");
+            from_points += u32::from(b == p && p != v);
+            from_views += u32::from(b == v && p != v);
+        }
+        assert!(from_points > 0 && from_views > 0, "{from_points} and {from_views}");
+        mixed += 1;
+    }
+    assert!(mixed >= 2, "never both");
+}
+
+/// A camera so many metres from the only tree of a scene, looking down on it by so many radians.
+fn alone(scene: &Scene, distance: f64, down: f64) -> Camera {
+    let foot = DVec3::from_array(scene.trees[0].position.map(f64::from));
+    let middle = foot + DVec3::Y * 5.0;
+    let (sin, cos) = down.sin_cos();
+    let from = DVec3::new(0.0, sin, cos);
+    let projection = Projection::Perspective { fov_y: 0.3 };
+    Camera::new(middle + from * distance, -from, projection, [128, 128])
+}
+
+#[test]
+fn trunks_before_their_own_crowns_column_are_not_left_out() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make(dir.path(), 4000, &[])).unwrap();
+    for name in ["overview", "aerial"] {
+        let camera = scene.file.camera(Some(name)).unwrap().camera(&scene.land, [320, 180]);
+        let with = |least_seen: f64| {
+            let detail = LandscapeDetail { least_seen, hidden: 0.0, ..LandscapeDetail::default() };
+            draw(&gpu, &scene, &camera, &detail, false, 1)
+        };
+        let [all, usual] = [0.0, LandscapeDetail::default().least_seen].map(with);
+        let differ = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.02);
+        let lost = all.pixels.iter().zip(&usual.pixels).filter(|p| differ(*p)).count();
+        let share = lost as f64 / all.pixels.len() as f64;
+        assert!(usual.counts.points < all.counts.points);
+        assert!(share < 0.015, "{name}: {share} of the samples lack what is seen");
+    }
 }
 
 #[test]
@@ -202,11 +312,12 @@ fn trees_of_a_pixel_keep_their_colour() {
     let sight = Sight { name: "high".into(), at: [0.0; 2], above, yaw: 0.0, pitch: -90.0, fov };
     let camera = sight.camera(&scene.land, [64, 64]);
     let crop = [Crop { corner: [16, 16], size: [32, 32] }];
-    let soups = TREES.iter().map(|t| load_soup(&repo("sample-data").join(t)).unwrap());
-    let truth = pictures(&scene, &Sources::new(soups.collect()), &camera, &crop, 4);
+    let truth = pictures(&scene, &sources(), &camera, &crop, 4);
     let theirs = mean(truth[0].pixels.iter().map(|p| [p[0], p[1], p[2]]));
-    let drawn = draw(&gpu, &scene, &camera, &LandscapeDetail::default(), false, 2);
+    let every = LandscapeDetail { least_seen: 0.0, ..LandscapeDetail::default() };
+    let drawn = draw(&gpu, &scene, &camera, &every, false, 2);
     assert_eq!(drawn.counts.trees as usize, scene.trees.len());
+    let drawn = draw(&gpu, &scene, &camera, &LandscapeDetail::default(), false, 2);
     assert!(drawn.counts.points < 8 * drawn.counts.trees, "{:?}", drawn.counts);
     let inside = (0..1024usize).map(|i| drawn.pixels[(16 + i / 32) * 64 + 16 + i % 32]);
     let ours = mean(inside);

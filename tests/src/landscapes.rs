@@ -117,14 +117,28 @@ pub fn averaged(samples: &[[f32; 4]], width: u32, height: u32, side: u32) -> Vec
 /// Mean FLIP of a picture `width` pixels wide over crops of the truth.
 pub fn flip(picture: &[[f32; 3]], width: u32, crops: &[Crop], truth: &[Picture]) -> f64 {
     let of = |(crop, truth): (&Crop, &Picture)| {
-        let [w, h] = crop.size;
-        let mut part = Picture::empty(w, h);
-        for (i, pixel) in part.pixels.iter_mut().enumerate() {
-            let (x, y) = (crop.corner[0] + i as u32 % w, crop.corner[1] + i as u32 / w);
-            let [r, g, b] = picture[(y * width + x) as usize];
-            *pixel = [r, g, b, 1.0];
-        }
-        Comparison::new(truth, &part).flip(0.0).mean()
+        Comparison::new(truth, &part(picture, width, crop)).flip(0.0).mean()
     };
     crops.iter().zip(truth).map(of).sum::<f64>() / crops.len() as f64
+}
+
+/// Mean luminance of a picture `width` pixels wide in all crops, over that of the truth.
+pub fn brightness(picture: &[[f32; 3]], width: u32, crops: &[Crop], truth: &[Picture]) -> f64 {
+    let sum = |p: &Picture| {
+        let luminance = |p: &[f32; 4]| f64::from(0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2]);
+        p.pixels.iter().map(luminance).sum::<f64>()
+    };
+    let ours: f64 = crops.iter().map(|c| sum(&part(picture, width, c))).sum();
+    ours / truth.iter().map(sum).sum::<f64>()
+}
+
+fn part(picture: &[[f32; 3]], width: u32, crop: &Crop) -> Picture {
+    let [w, h] = crop.size;
+    let mut part = Picture::empty(w, h);
+    for (i, pixel) in part.pixels.iter_mut().enumerate() {
+        let (x, y) = (crop.corner[0] + i as u32 % w, crop.corner[1] + i as u32 / w);
+        let [r, g, b] = picture[(y * width + x) as usize];
+        *pixel = [r, g, b, 1.0];
+    }
+    part
 }

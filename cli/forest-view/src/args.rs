@@ -55,6 +55,14 @@ pub(crate) struct Args {
     /// hidden; 0 draws what is hidden as finely as what is seen.
     #[arg(long, default_value_t = 2.0 / 3.0, value_name = "POWER", value_parser = not_negative)]
     pub(crate) hidden: f64,
+    /// Scenes: what is estimated to be seen less of than this share, for the trees before it, is left out;
+    /// 0 leaves out only what is surely covered.
+    #[arg(long, default_value_t = 1.0 / 64.0, value_name = "SHARE", value_parser = not_negative)]
+    pub(crate) least_seen: f64,
+    /// Scenes: far trees are drawn by views up to so many times the size at which they are as fine as
+    /// points; 0 for points alone.
+    #[arg(long, default_value_t = 1.0, value_name = "TIMES", value_parser = not_negative)]
+    pub(crate) impostors: f64,
     /// How views are looked up.
     #[arg(long, value_enum, default_value = "depth")]
     pub(crate) lookup: LookupArg,

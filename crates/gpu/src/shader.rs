@@ -16,6 +16,7 @@ const SPLAT_BOX: &str = include_str!("wgsl/splat_box.wgsl");
 const KEEP64: &str = include_str!("wgsl/keep64.wgsl");
 const KEEP32: &str = include_str!("wgsl/keep32.wgsl");
 const LARGE: &str = include_str!("wgsl/points_large.wgsl");
+const TILE: &str = include_str!("wgsl/tile.wgsl");
 const TRIANGLES: &str = include_str!("wgsl/triangles.wgsl");
 
 /// Names the share of samples that fading layers draw, among the uses of the hash rule.
@@ -48,6 +49,8 @@ pub(crate) enum Step {
     Between,
     Splat(bool),
     Resolve,
+    Sort,
+    Impostors,
     Large,
     Triangles,
 }
@@ -71,7 +74,7 @@ impl Shader {
                 let block = include_str!("wgsl/triangles_block.wgsl");
                 &[COMMON, LIT_BLOCK, CELL, TRIANGLES, block]
             }
-            Self::Views => &[COMMON, LIT_BLOCK, include_str!("wgsl/views.wgsl")],
+            Self::Views => &[COMMON, LIT_BLOCK, TILE, include_str!("wgsl/views.wgsl")],
             Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],
             Self::Present => &[include_str!("wgsl/present.wgsl")],
             Self::Landscape(step) => return [constants(), step.text()].concat(),
@@ -91,6 +94,8 @@ impl Step {
     fn text(self) -> String {
         const LIGHT: &str = include_str!("wgsl/landscape/light.wgsl");
         const NEARNESS: &str = include_str!("wgsl/landscape/nearness.wgsl");
+        const TREE: &str = include_str!("wgsl/landscape/tree.wgsl");
+        const BOARDS: &str = include_str!("wgsl/landscape/boards.wgsl");
         const TREES: &str = include_str!("wgsl/landscape/trees.wgsl");
         let keep = |wide| if wide { KEEP64 } else { KEEP32 };
         let parts: &[&str] = match self {
@@ -99,9 +104,10 @@ impl Step {
             Self::Nearness => &[include_str!("wgsl/landscape/near.wgsl")],
             Self::Choose(wide) => {
                 let choose = include_str!("wgsl/landscape/choose.wgsl");
-                let shared = [LIGHT, CELL, POINTS, CHUNK_OF, SPLAT_BOX, NEARNESS, TREES];
-                return [COMMON, &shared.concat(), choose, keep(wide)].concat();
+                let shared = [LIGHT, CELL, POINTS, CHUNK_OF, SPLAT_BOX, NEARNESS, TREE, TREES];
+                return [COMMON, &shared.concat(), BOARDS, choose, keep(wide)].concat();
             }
+            Self::Sort => return [BOARDS, include_str!("wgsl/landscape/sort.wgsl")].concat(),
             Self::Between => return include_str!("wgsl/landscape/steps.wgsl").into(),
             Self::Splat(wide) => {
                 let splat = include_str!("wgsl/landscape/splat.wgsl");
@@ -109,6 +115,9 @@ impl Step {
                 return [COMMON, &shared.concat(), splat, keep(wide)].concat();
             }
             Self::Resolve => &[LIGHT, include_str!("wgsl/landscape/resolve.wgsl")],
+            Self::Impostors => {
+                &[LIGHT, CELL, TREE, TILE, include_str!("wgsl/landscape/impostor.wgsl")]
+            }
             Self::Large => &[LIGHT, CELL, POINTS, LARGE],
             Self::Triangles => {
                 &[LIGHT, CELL, TRIANGLES, include_str!("wgsl/landscape/triangles.wgsl")]
@@ -134,13 +143,19 @@ fn constants() -> String {
         ("MOST_NEARNESS", landscape::MOST_NEARNESS as u32),
         ("MOST_BANDS", landscape::MOST_BANDS as u32),
         ("RUN_TRIANGLES", landscape::RUN_TRIANGLES),
+        ("BUCKETS", landscape::BUCKETS),
+        ("COMPASS_AROUND", landscape::COMPASS[0]),
+        ("COMPASS_UP", landscape::COMPASS[1]),
         ("RAW_SIDE", crate::volume::RAW_SIDE),
         ("MOST_LEVELS", crate::volume::MOST_LEVELS as u32),
     ];
     let floats = [
+        ("HALF_TURN", std::f64::consts::PI),
+        ("BUCKETS_PER_OCTAVE", f64::from(landscape::BUCKETS_PER_OCTAVE)),
+        ("IMPOSTOR_FADE", landscape::IMPOSTOR_FADE),
+        ("LEAST_IMPOSTOR", landscape::LEAST_IMPOSTOR),
         ("DIFFUSE", forest_scene::DIFFUSE),
         ("DEPTH_STEPS", f64::from(forest_scene::DEPTH_STEPS)),
-        ("LEAST_THROUGH_TREES", landscape::LEAST_THROUGH_TREES),
         ("LEAST_SHARE", landscape::LEAST_SHARE),
         ("SIZE_TOP", SizeCode::LOG2_TOP),
         ("SIZES_PER_OCTAVE", SizeCode::PER_OCTAVE),

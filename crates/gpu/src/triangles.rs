@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use forest_pack::Pack;
 use forest_points::{PointsBlock, UvRange, read_materials};
 use forest_soup::{AlphaMode, Material, Texture, Wrap};
-use wgpu::{BindGroup, BindGroupLayout, BindingResource, Buffer};
+use wgpu::{BindGroup, BindGroupLayout, BindingResource, Buffer, TextureFormat};
 
 /// `Material` of triangles.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -56,11 +56,12 @@ impl TrianglesModel {
         let (materials, textures) = read_materials(pack)?;
         let sizes: Vec<[u32; 2]> = textures.iter().map(|t| [t.width, t.height]).collect();
         let sheet = Sheet::new(gpu, &sizes)?;
+        let sheet_texture = sheet.texture(gpu, "textures", TextureFormat::Rgba8UnormSrgb)?;
         for (texture, place) in textures.iter().zip(&sheet.places) {
             let [x, y] = place.corner;
             let size = [texture.width, texture.height, 1];
             let origin = [x, y, place.layer];
-            gpu.write_texels(&sheet.texture, origin, size, texture.texels.as_flattened());
+            gpu.write_texels(&sheet_texture, origin, size, texture.texels.as_flattened());
         }
         let images: Vec<ImageRecord> =
             textures.iter().zip(&sheet.places).map(|(t, p)| image_record(t, p)).collect();
@@ -75,7 +76,6 @@ impl TrianglesModel {
         let materials = gpu.storage("materials", &[bytemuck::cast_slice(&materials)])?;
         let images = gpu.storage("images", &[bytemuck::cast_slice(&images)])?;
         let colors = gpu.storage("vertex colours", &[colors])?;
-        let sheet_texture = sheet.texture;
         let sheet = array_view(&sheet_texture);
         let tables = [&triangles, cells, &materials, &images, &colors];
         let mut all: Vec<BindingResource> = tables.map(Buffer::as_entire_binding).into();

@@ -10,8 +10,9 @@ use crate::textures::array_view;
 use bytemuck::{Pod, Zeroable};
 use forest_pack::Pack;
 use forest_soup::Camera;
-use forest_views::{Blend, Channel, Lookup, Quality, ViewsBlock, decode, views};
+use forest_views::{Blend, Channel, Lookup, Quality, ViewFrame, ViewsBlock, decode, views};
 use glam::IVec2;
+use std::borrow::Cow;
 use wgpu::{
     BindGroup, BindGroupLayout, BindingResource, Buffer, BufferUsages, PrimitiveTopology,
     RenderPass, RenderPipeline, ShaderStages, Texture, TextureFormat,
@@ -41,7 +42,7 @@ struct SpriteUniform {
 /// `ViewFrame` of views.wgsl.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-struct FrameRecord {
+pub(crate) struct FrameRecord {
     right: [f32; 4],
     up: [f32; 4],
     back: [f32; 4],
@@ -72,12 +73,7 @@ impl<'p> ViewsModel<'p> {
         let size = size_of::<SpriteUniform>() as u64;
         let sprite = || gpu.buffer("sprite", size, BufferUsages::UNIFORM);
         let sprites = [sprite()?, sprite()?];
-        let vector = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
-        let frames: Vec<FrameRecord> = block
-            .frames
-            .iter()
-            .map(|f| FrameRecord { right: vector(f.right), up: vector(f.up), back: vector(f.back) })
-            .collect();
+        let frames = frame_records(&block);
         let frames = gpu.storage("frames of views", &[bytemuck::cast_slice(&frames)])?;
         let blocks = gpu.takes_blocks();
         let mut groups = Vec::new();
@@ -189,6 +185,17 @@ impl<'p> ViewsModel<'p> {
     }
 }
 
+/// The frames of all views.
+pub(crate) fn frame_records(block: &ViewsBlock) -> Vec<FrameRecord> {
+    let vector = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
+    let record = |f: &ViewFrame| FrameRecord {
+        right: vector(f.right),
+        up: vector(f.up),
+        back: vector(f.back),
+    };
+    block.frames.iter().map(record).collect()
+}
+
 /// A channel of a level as textures: as it is stored where the device reads blocks, else decoded.
 fn pages(
     gpu: &Gpu,
@@ -197,30 +204,54 @@ fn pages(
     level: usize,
     blocks: bool,
 ) -> Result<Texture, GpuError> {
-    let stored = block.stored(channel, level)?;
     let header = &block.header.levels[level];
     let compressed = block.header.quality == Quality::Block && blocks;
-    let format = match (channel, compressed) {
+    let format = page_format(channel, compressed);
+    let texels = page_texels(block, channel, level, compressed)?;
+    if texels.is_empty() {
+        return gpu.texture_array("a channel that is not there", [4, 4], 1, format);
+    }
+    let [width, height] = header.page;
+    let texture = gpu.texture_array("pages of views", header.page, header.pages, format)?;
+    gpu.write_texels(&texture, [0; 3], [width, height, header.pages], &texels);
+    Ok(texture)
+}
+
+/// The format of a channel's texels on the device.
+pub(crate) fn page_format(channel: Channel, compressed: bool) -> TextureFormat {
+    match (channel, compressed) {
         (Channel::Color, true) => TextureFormat::Bc7RgbaUnormSrgb,
         (Channel::Color, false) => TextureFormat::Rgba8UnormSrgb,
         (Channel::Normal, true) => TextureFormat::Bc5RgUnorm,
         (Channel::Normal, false) => TextureFormat::Rg8Unorm,
         (Channel::Depth | Channel::Sky, true) => TextureFormat::Bc4RUnorm,
         (Channel::Depth | Channel::Sky, false) => TextureFormat::R8Unorm,
+    }
+}
+
+/// The pages of a channel of a level in that format; empty if it is not stored. Of depth that is not
+/// compressed, the upper bytes.
+pub(crate) fn page_texels<'a>(
+    block: &ViewsBlock<'a>,
+    channel: Channel,
+    level: usize,
+    compressed: bool,
+) -> Result<Cow<'a, [u8]>, GpuError> {
+    let stored = block.stored(channel, level)?;
+    if compressed || stored.is_empty() {
+        return Ok(stored);
+    }
+    let plain = match block.header.quality {
+        Quality::Lossless => stored,
+        Quality::Block => {
+            let width = block.header.levels[level].page[0];
+            Cow::Owned(decode(channel, block.header.quality, width, &stored))
+        }
     };
-    if stored.is_empty() {
-        return gpu.texture_array("a channel that is not there", [4, 4], 1, format);
-    }
-    let [width, height] = header.page;
-    let texture = gpu.texture_array("pages of views", header.page, header.pages, format)?;
-    let size = [width, height, header.pages];
-    if compressed || block.header.quality == Quality::Lossless {
-        gpu.write_texels(&texture, [0; 3], size, &stored);
-    } else {
-        let texels = decode(channel, block.header.quality, width, &stored);
-        gpu.write_texels(&texture, [0; 3], size, &texels);
-    }
-    Ok(texture)
+    Ok(match channel {
+        Channel::Depth => plain.iter().skip(1).step_by(2).copied().collect::<Vec<u8>>().into(),
+        _ => plain,
+    })
 }
 
 /// The pipeline.

@@ -4,6 +4,7 @@ use crate::error::SceneError;
 use forest_pack::Pack;
 use forest_points::{PixelArea, PointsBlock, Thresholds, select, spheroid, within_budget};
 use forest_soup::{Camera, Projection};
+use forest_views::ViewsBlock;
 use glam::{DVec3, Vec3};
 
 /// What all trees of a species have in common.
@@ -137,5 +138,14 @@ impl Species {
     /// When the pack has none, or they are damaged.
     pub fn points(&self) -> Result<PointsBlock<'_>, SceneError> {
         Ok(PointsBlock::open(&self.pack)?)
+    }
+
+    /// The views of its pack, if there are any.
+    ///
+    /// # Errors
+    /// When they are damaged.
+    pub fn views(&self) -> Result<Option<ViewsBlock<'_>>, SceneError> {
+        let there = ViewsBlock::is_in(&self.pack).then(|| ViewsBlock::open(&self.pack));
+        Ok(there.transpose()?)
     }
 }

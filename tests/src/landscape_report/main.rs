@@ -10,7 +10,7 @@ use forest_gpu::{Gpu, instance};
 use forest_points::PixelArea;
 use forest_scene::Scene;
 use forest_soup::{Camera, linear_to_srgb8};
-use forest_tests::landscapes::{Crop, Sources, flip, pictures};
+use forest_tests::landscapes::{Crop, Sources, brightness, flip, pictures};
 use forest_tests::report_trees;
 use forest_tests::reports::{load_soup, name_of, program};
 use ours::Ours;
@@ -27,6 +27,8 @@ const COUNTS: [u32; 5] = [1_000, 10_000, 100_000, 200_000, 1_000_000];
 const SHARED: [&str; 3] = ["sap_pine_20k.glb", "sap_birch_200k.glb", "ez_ash_medium.glb"];
 const OWN: [&str; 3] = ["conifer.glb", "broadleaf_young.gltf", "shrub.obj"];
 const STANDS: [&str; 3] = ["height=18,weight=2", "height=16", "height=14"];
+/// Of the finest views.
+const VIEW_TEXELS: &str = "128";
 /// Samples along a side of a pixel of the truth.
 const TRUTH_SIDE: u32 = 6;
 /// Our s_m in square pixels, and square pixels of a triangle of the peer's levels.
@@ -46,6 +48,8 @@ const CROPS: [Crop; 3] = [
 ];
 
 fn main() -> Result<()> {
+    // With numbers of trees, only these are measured and nothing is written.
+    let asked: Vec<u32> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let out = root.join("out/landscape");
     std::fs::create_dir_all(&out)?;
@@ -56,10 +60,13 @@ fn main() -> Result<()> {
     let sources = Sources::new(soups);
     let gpu = Gpu::open(&instance(false, None), None, None)?;
     let mut rows = Vec::new();
-    for count in COUNTS {
+    for &count in if asked.is_empty() { &COUNTS[..] } else { &asked } {
         eprintln!("{count} trees");
         let scene = Scene::open(&made(count, &packs, &out)?)?;
         measure(&gpu, &scene, &sources, &mut rows)?;
+    }
+    if !asked.is_empty() {
+        return Ok(());
     }
     show(&gpu, &root, &out)?;
     let names: Vec<String> = trees.iter().map(|t| name_of(t)).collect();
@@ -82,6 +89,8 @@ fn baked(tree: &Path, out: &Path) -> Result<PathBuf> {
     let pack = out.join(name_of(tree)).with_extension("fpack");
     let [from, to] = [tree, &pack].map(|p| p.to_string_lossy().into_owned());
     program(&["points", &from, "-o", &to, "--force", "-q"])?;
+    let what = ["--texels", VIEW_TEXELS, "--channels", "color,normal,depth", "-q"];
+    program(&[&["views", &from, "-o", &to][..], &what].concat())?;
     Ok(pack)
 }
 
@@ -100,10 +109,13 @@ fn made(count: u32, packs: &[PathBuf], out: &Path) -> Result<PathBuf> {
 fn measure(gpu: &Gpu, scene: &Scene, sources: &Sources, rows: &mut Vec<Row>) -> Result<()> {
     let camera = scene.file.camera(None).context("no camera")?.camera(&scene.land, SIZE);
     let truth = pictures(scene, sources, &camera, &CROPS, TRUTH_SIDE);
-    let error = |picture: &[[f32; 3]]| flip(picture, SIZE[0], &CROPS, &truth);
+    let error = |picture: &[[f32; 3]]| {
+        [flip(picture, SIZE[0], &CROPS, &truth), brightness(picture, SIZE[0], &CROPS, &truth)]
+    };
     let trees = scene.trees.len();
     let mut ours = Ours::new(gpu, scene, SIZE, 1)?;
-    for finest in FINEST {
+    for (finest, impostors) in FINEST.map(|f| (f, 1.0)).into_iter().chain([(FINEST[0], 0.0)]) {
+        ours.detail.impostors = impostors;
         ours.detail.finest = PixelArea(finest);
         ours.detail.largest = PixelArea(16.0 * finest);
         let (flight, _) = times(&flight(scene)?, 1, |c| Ok(ours.frame(gpu, c)?.0))?;
@@ -111,14 +123,17 @@ fn measure(gpu: &Gpu, scene: &Scene, sources: &Sources, rows: &mut Vec<Row>) -> 
         let drawn = ours.frame(gpu, &camera)?.1;
         rows.push(Row {
             trees,
-            way: format!("ours, s_m {finest} px²"),
+            way: match impostors {
+                0.0 => format!("ours, s_m {finest} px², without views"),
+                _ => format!("ours, s_m {finest} px²"),
+            },
             still,
             flight: Some(flight),
-            primitives: drawn.points + drawn.triangles,
+            primitives: drawn.points + drawn.triangles + drawn.impostors,
             drawn: drawn.trees,
             left_out: drawn.left_out,
             bytes: ours.bytes(),
-            flip: error(&ours.picture(gpu)?),
+            error: error(&ours.picture(gpu)?),
         });
         eprintln!("{}", rows[rows.len() - 1].brief());
     }
@@ -151,7 +166,7 @@ fn measure(gpu: &Gpu, scene: &Scene, sources: &Sources, rows: &mut Vec<Row>) -> 
                 drawn: drawn.trees,
                 left_out: drawn.left_out,
                 bytes: model.device_bytes(),
-                flip: error(&model.picture(gpu)?),
+                error: error(&model.picture(gpu)?),
             });
             eprintln!("{}", rows[rows.len() - 1].brief());
         }

@@ -36,12 +36,15 @@ pub(crate) struct Row {
     pub(crate) drawn: u64,
     pub(crate) left_out: u64,
     pub(crate) bytes: u64,
-    pub(crate) flip: f64,
+    /// FLIP, and mean luminance over the truth's.
+    pub(crate) error: [f64; 2],
 }
 
 impl Row {
     pub(crate) fn brief(&self) -> String {
-        format!("  {}: {:.0} ms, FLIP {:.3}", self.way, self.still.p50, self.flip)
+        let [flip, bright] = self.error;
+        let (way, ms) = (&self.way, self.still.p50);
+        format!("  {way}: {ms:.0} ms, FLIP {flip:.3}, brightness {bright:.2}")
     }
 
     fn line(&self) -> String {
@@ -54,14 +57,15 @@ impl Row {
             n => format!(" ({} left out)", count(n)),
         };
         format!(
-            "| {} | {} | {:.0} | {flight} | {:.2} | {}{rest} | {:.0} | {:.3} |",
+            "| {} | {} | {:.0} | {flight} | {:.2} | {}{rest} | {:.0} | {:.3} | {:.2} |",
             count(self.trees as u64),
             self.way,
             self.still.p50,
             self.primitives as f64 / 1e6,
             count(self.drawn),
             self.bytes as f64 / 1e6,
-            self.flip
+            self.error[0],
+            self.error[1]
         )
     }
 }
@@ -78,7 +82,7 @@ fn count(n: u64) -> String {
 }
 
 const HEAD: &str = "| trees | drawn as | frame, ms | flight p50 / p95 / p99, ms | millions of points and \
-triangles | trees drawn | MB on the device | FLIP |\n|---|---|---|---|---|---|---|---|\n";
+triangles | trees drawn | MB on the device | FLIP | brightness |\n|---|---|---|---|---|---|---|---|---|\n";
 
 /// Writes docs/LANDSCAPE.md and the README's table.
 pub(crate) fn write(root: &Path, adapter: &str, trees: &[String], rows: &[Row]) -> Result<()> {

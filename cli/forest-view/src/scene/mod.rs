@@ -69,7 +69,9 @@ fn detail(args: &Args) -> LandscapeDetail {
     let usual = LandscapeDetail::default();
     let finest = args.finest.map_or(usual.finest, PixelArea);
     let largest = args.largest.unwrap_or(finest.0 * Thresholds::LARGEST_RATIO);
-    LandscapeDetail { finest, largest: PixelArea(largest), hidden: args.hidden, ..usual }
+    let (hidden, least_seen, impostors) = (args.hidden, args.least_seen, args.impostors);
+    let largest = PixelArea(largest);
+    LandscapeDetail { finest, largest, hidden, least_seen, impostors, ..usual }
 }
 
 /// How finely to draw, from picture to picture.
@@ -125,7 +127,8 @@ impl Goal {
 
 /// What a picture took, in words.
 fn describe(drawn: &LandscapeDrawn) -> String {
-    let LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out, beyond } = drawn;
+    let LandscapeDrawn { looked_at, trees, impostors, points, triangles, ground, .. } = drawn;
+    let LandscapeDrawn { left_out, beyond, .. } = drawn;
     let mut rest = String::new();
     if *left_out > 0 {
         rest += &format!("; NO ROOM for {left_out} runs");
@@ -136,6 +139,7 @@ fn describe(drawn: &LandscapeDrawn) -> String {
         );
     }
     format!(
-        "{trees} of {looked_at} trees, {points} points, {triangles} triangles, {ground} of ground{rest}"
+        "{trees} of {looked_at} trees, {impostors} by views, {points} points, {triangles} triangles, \
+         {ground} of ground{rest}"
     )
 }

@@ -18,6 +18,11 @@ pub struct LandscapeDetail {
     /// Power by which thresholds grow where other trees or the tree itself hide most: at 2/3, what is
     /// seen an eighth of is drawn in points of four times the area. 0 for none.
     pub hidden: f64,
+    /// What is estimated to be seen less of than this, for all the trees before it, is left out; at 0
+    /// only what is surely covered is.
+    pub least_seen: f64,
+    /// How many times as large as an impostor is as fine as points it may be; 0 for none.
+    pub impostors: f64,
     /// Pixels that the ground may be off.
     pub ground: f64,
 }
@@ -26,7 +31,14 @@ impl Default for LandscapeDetail {
     /// Points of about two pixels by two, triangles above sixteen times that, ground within half a pixel.
     fn default() -> Self {
         let finest = PixelArea(4.0);
-        Self { finest, largest: PixelArea(64.0), hidden: 2.0 / 3.0, ground: 0.5 }
+        Self {
+            finest,
+            largest: PixelArea(64.0),
+            hidden: 2.0 / 3.0,
+            least_seen: 1.0 / 64.0,
+            impostors: 1.0,
+            ground: 0.5,
+        }
     }
 }
 
@@ -37,6 +49,8 @@ pub struct LandscapeDrawn {
     pub looked_at: u64,
     /// Trees that were drawn.
     pub trees: u64,
+    /// Those of them that were drawn by views.
+    pub impostors: u64,
     /// Points that were looked at.
     pub points: u64,
     /// Triangles of trees.
@@ -50,9 +64,9 @@ pub struct LandscapeDrawn {
 }
 
 impl LandscapeDrawn {
-    /// Points and triangles.
+    /// Points, triangles and quads.
     pub fn primitives(&self) -> u64 {
-        self.points + self.triangles + self.ground
+        self.points + self.triangles + self.impostors + self.ground
     }
 }
 
@@ -98,6 +112,10 @@ pub(crate) struct LandUniform {
     few: u32,
     zenith: [f32; 3],
     hidden: f32,
+    pixel: f32,
+    impostors: f32,
+    least_seen: f32,
+    zero: f32,
 }
 
 /// Points of a far tree that the culling shader draws itself.
@@ -126,6 +144,10 @@ impl LandUniform {
             few: FEW,
             zenith: sky.zenith,
             hidden: detail.hidden as f32,
+            pixel: samples as f32,
+            impostors: detail.impostors as f32,
+            least_seen: detail.least_seen as f32,
+            zero: 0.0,
         }
     }
 }
@@ -160,9 +182,17 @@ const BAND_GROWTH: f32 = 1.6;
 const FIRST_BAND: f32 = 1.5;
 
 impl Bands {
-    /// Puts the tiles before the camera into `count` bands by distance, the nearest first; `reach` is the
-    /// radius about a tree's foot that holds the largest tree of each species.
-    pub(crate) fn fill(&mut self, tiles: &[Tile], reach: &[f64], camera: &Camera, count: usize) {
+    /// Puts the tiles before the camera into `count` bands by distance at most, the nearest first; `reach`
+    /// is the radius about a tree's foot that holds the largest tree of each species. The last band begins
+    /// no later than at `last`.
+    pub(crate) fn fill(
+        &mut self,
+        tiles: &[Tile],
+        reach: &[f64],
+        camera: &Camera,
+        count: usize,
+        last: f64,
+    ) {
         self.order.clear();
         self.tiles.clear();
         self.trees = 0;
@@ -183,7 +213,7 @@ impl Bands {
         let mut begin = 0.0f32;
         let mut end = FIRST_BAND * reach.iter().copied().fold(1.0, f64::max) as f32;
         for (b, band) in self.firsts.iter_mut().enumerate().take(count) {
-            if b + 1 == count {
+            if b + 1 == count || f64::from(begin) >= last {
                 end = f32::MAX;
             }
             let first = self.tiles.len();
@@ -195,6 +225,9 @@ impl Bands {
             }
             let many = self.tiles.len() - first;
             *band = [first as u32, many as u32, begin.to_bits(), end.to_bits()];
+            if end == f32::MAX {
+                break;
+            }
             (begin, end) = (end, end * BAND_GROWTH);
         }
     }
@@ -217,7 +250,7 @@ mod tests {
         let eye = DVec3::new(0.0, 2.0, -300.0);
         let camera = Camera::new(eye, -DVec3::Z, projection, [64, 64]);
         let mut bands = Bands::default();
-        bands.fill(&tiles, &[5.0], &camera, 4);
+        bands.fill(&tiles, &[5.0], &camera, 4, f64::INFINITY);
         // Those behind are left out, but for the one that the eye stands in.
         assert_eq!(bands.trees, 300);
         assert_eq!(bands.tiles[0], [100, 10]);
@@ -227,5 +260,9 @@ mod tests {
         let counts: Vec<u32> = bands.firsts.iter().map(|b| b[1]).collect();
         assert_eq!(counts[..4], [1, 1, 1, 29]);
         assert_eq!(bands.firsts[3][0], 3);
+        // From 10 m on nothing hides: one band for all that is farther.
+        bands.fill(&tiles, &[5.0], &camera, 4, 10.0);
+        let counts: Vec<u32> = bands.firsts.iter().map(|b| b[1]).collect();
+        assert_eq!(counts[..4], [1, 1, 30, 0]);
     }
 }

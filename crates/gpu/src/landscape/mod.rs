@@ -8,6 +8,7 @@
 //! of the ground.
 
 mod frame;
+mod impostors;
 mod model;
 mod pass;
 mod steer;
@@ -15,6 +16,7 @@ mod tables;
 mod target;
 
 pub use frame::{LandscapeDetail, LandscapeDrawn};
+pub(crate) use impostors::{BUCKETS, BUCKETS_PER_OCTAVE, COMPASS};
 pub use model::Landscape;
 pub use pass::LandscapeRenderer;
 pub use steer::{Steering, finest_for};
@@ -32,8 +34,12 @@ pub(crate) const LEAST_SHARE: f64 = 1.0 / 16.0;
 /// Places on the way to the eye that are asked for trees.
 pub(crate) const VIEW_STEPS: u32 = 10;
 
-/// What less light than this comes through to the eye from is left out.
-pub(crate) const LEAST_THROUGH_TREES: f64 = 1.0 / 64.0;
+/// Pixels along the side of the smallest impostor; smaller trees are a few points.
+pub(crate) const LEAST_IMPOSTOR: f64 = 4.0;
+
+/// Impostors are all there is of a tree up to so much of the size at which they are as fine as points;
+/// from there on points take over.
+pub(crate) const IMPOSTOR_FADE: f64 = 0.8;
 
 /// Levels of the pyramid, and the probes.
 pub(crate) const MOST_NEARNESS: usize = 8;

@@ -5,8 +5,9 @@ use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::frame::FrameUniform;
 use crate::landscape::frame::{Bands, LandUniform, LandscapeDrawn, LightMapUniform};
+use crate::landscape::impostors::Impostors;
 use crate::landscape::pass::LandscapeRenderer;
-use crate::landscape::tables::Tables;
+use crate::landscape::tables::{SpeciesRecord, Tables};
 use crate::landscape::{MOST_BANDS, RUN_TRIANGLES};
 use crate::points::{CellUniform, ChunkRecord};
 use crate::triangles::TrianglesModel;
@@ -55,6 +56,7 @@ pub struct Landscape<'s> {
     ground: Ground,
     tiles: Vec<Tile>,
     reach: Vec<f64>,
+    species: Vec<SpeciesRecord>,
     maps: [LightMapUniform; 2],
     light: Light,
     pub(crate) frame: Buffer,
@@ -70,6 +72,9 @@ pub struct Landscape<'s> {
     pub(crate) large: Buffer,
     pub(crate) large_group: BindGroup,
     pub(crate) triangles: Vec<Option<TrianglesModel>>,
+    /// Without views there are none.
+    pub(crate) impostors: Impostors,
+    pub(crate) has_views: bool,
     pub(crate) counted: Buffer,
     /// What the groups of a target's passes bind of it.
     pub(crate) choose: Vec<Buffer>,
@@ -92,8 +97,9 @@ impl<'s> Landscape<'s> {
     ) -> Result<Self, GpuError> {
         let mut tables = Tables::default();
         let blocks: Vec<_> = scene.species.iter().map(|s| s.points()).collect::<Result<_, _>>()?;
-        for (species, block) in scene.species.iter().zip(&blocks) {
-            tables.add(species, block)?;
+        let views: Vec<_> = scene.species.iter().map(|s| s.views()).collect::<Result<_, _>>()?;
+        for ((species, block), views) in scene.species.iter().zip(&blocks).zip(&views) {
+            tables.add(species, block, views.as_ref())?;
         }
         for (i, record) in (0..).zip(&mut tables.species) {
             (record.first_run, record.runs) = (i * MOST_RUNS, MOST_RUNS);
@@ -119,6 +125,9 @@ impl<'s> Landscape<'s> {
         let runs = gpu.buffer("runs of triangles", kinds * runs_each, storage)?;
         let indirect = storage | BufferUsages::INDIRECT;
         let draws = gpu.buffer("draws of triangles", kinds * 16, indirect)?;
+        let there: Vec<_> = views.iter().flatten().collect();
+        let (planted, count) = ([&trees, &species], scene.trees.len() as u64);
+        let impostors = Impostors::load(gpu, renderer, &there, &tables.views, planted, count)?;
         let arguments = gpu.buffer("arguments", 32, indirect)?;
         let large = gpu.buffer("large points", MOST_LARGE * 8 + 16, indirect)?;
         let tiles = instances::tiles(&scene.trees);
@@ -185,7 +194,7 @@ impl<'s> Landscape<'s> {
         let stances = scene.stances();
         let choose = [&points, &tile_list, &radii, &trees, &species, &stocks, &work, &cells]
             .into_iter()
-            .chain([&chunks, &prefixes, &sizes, &runs, &draws])
+            .chain([&chunks, &prefixes, &sizes, &runs, &draws, impostors.boards()])
             .cloned()
             .collect();
         let splat = [&points, &cells, &radii, &chunks, &large, &work].map(Buffer::clone).into();
@@ -194,12 +203,14 @@ impl<'s> Landscape<'s> {
             .chain([&sizes, &runs, &draws, &large, &tile_list, &sun_map, &sky_map, &vertices])
             .chain([&patches]);
         let bytes = all.map(Buffer::size).sum::<u64>()
-            + triangles.iter().flatten().map(|t| t.bytes()).sum::<u64>();
+            + triangles.iter().flatten().map(|t| t.bytes()).sum::<u64>()
+            + impostors.bytes();
         gpu.finish()?;
         Ok(Self {
             scene,
             ground,
             tiles,
+            species: tables.species,
             reach: stances.iter().map(|s| s.reach() * s.scale[1]).collect(),
             maps: [&sun, &sky].map(LightMapUniform::new),
             light,
@@ -216,6 +227,8 @@ impl<'s> Landscape<'s> {
             large,
             large_group,
             triangles,
+            has_views: !there.is_empty(),
+            impostors,
             counted,
             choose,
             splat,
@@ -243,10 +256,19 @@ impl<'s> Landscape<'s> {
         let bytes = crate::timer::read(gpu, &self.counted)?;
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
         let ground = u64::from(self.patch_count * 2 * PATCH * PATCH);
-        let [trees, points, triangles, left_out, beyond] =
-            [4, 5, 6, 7, 8].map(|i| u64::from(words[i]));
+        let [trees, points, triangles, left_out, beyond, impostors] =
+            [4, 5, 6, 7, 8, 9].map(|i| u64::from(words[i]));
         let looked_at = self.bands.trees;
-        Ok(LandscapeDrawn { looked_at, trees, points, triangles, ground, left_out, beyond })
+        Ok(LandscapeDrawn {
+            looked_at,
+            trees,
+            impostors,
+            points,
+            triangles,
+            ground,
+            left_out,
+            beyond,
+        })
     }
 
     /// Chooses tiles and patches, and uploads what a frame needs.
@@ -264,7 +286,9 @@ impl<'s> Landscape<'s> {
         let queue = &gpu.queue;
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         queue.write_buffer(&self.land, 0, bytemuck::bytes_of(&land));
-        self.bands.fill(&self.tiles, &self.reach, camera, bands);
+        let far = self.species.iter().map(|s| s.drawn_by_views_from(camera, detail));
+        let far = far.fold(0.0, f64::max);
+        self.bands.fill(&self.tiles, &self.reach, camera, bands, far);
         let head: &[u8] = bytemuck::cast_slice(&self.bands.firsts);
         queue.write_buffer(&self.tile_list, 0, head);
         let list = bytemuck::cast_slice(&self.bands.tiles);
@@ -277,6 +301,7 @@ impl<'s> Landscape<'s> {
         queue.write_buffer(&self.work, 0, bytemuck::cast_slice(&[0u32; WORK_HEAD]));
         let draw = [3 * RUN_TRIANGLES, 0, 0, 0];
         let draws: Vec<[u32; 4]> = vec![draw; self.triangles.len()];
+        self.impostors.clear(gpu);
         queue.write_buffer(&self.draws, 0, bytemuck::cast_slice(&draws));
         // Four corners, no instance yet.
         queue.write_buffer(&self.large, 0, bytemuck::cast_slice(&[4u32, 0, 0, 0]));

@@ -4,6 +4,7 @@ use crate::bind::{self, Kind};
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::landscape::frame::LandscapeDetail;
+use crate::landscape::impostors::SORTED_AT_ONCE;
 use crate::landscape::model::{Landscape, WORK_HEAD};
 use crate::landscape::target::LandscapeTarget;
 use crate::landscape::{MOST_BANDS, PATCH_VERTICES};
@@ -27,7 +28,7 @@ const BANDS: usize = 8;
 const _: () = assert!(BANDS <= MOST_BANDS);
 
 /// Storage buffers that a shader binds.
-const STORAGE_BUFFERS: u32 = 17;
+const STORAGE_BUFFERS: u32 = 18;
 
 /// The layouts of a landscape's groups.
 #[derive(Debug)]
@@ -42,6 +43,8 @@ pub(crate) struct Layouts {
     pub(crate) found: BindGroupLayout,
     pub(crate) large: BindGroupLayout,
     pub(crate) triangles: BindGroupLayout,
+    pub(crate) sort: BindGroupLayout,
+    pub(crate) impostors: BindGroupLayout,
 }
 
 impl Layouts {
@@ -51,7 +54,8 @@ impl Layouts {
         let compute = ShaderStages::COMPUTE;
         let layout =
             |label, stages, kinds: &[Kind]| bind::layout(&gpu.device, label, stages, kinds);
-        let choose = [r, r, r, r, r, r, w, w, w, r, r, r, w, w];
+        let choose = [r, r, r, r, r, r, w, w, w, r, r, r, w, w, w];
+        let pages = Kind::TextureArray;
         Self {
             land: layout("land", drawn | compute, &[u, u, r, r]),
             ground: layout("ground", drawn, &[r, r, u]),
@@ -62,7 +66,9 @@ impl Layouts {
             splat: layout("splat", compute, &[r, r, r, r, w, r, r]),
             found: layout("found", drawn, &[r]),
             large: layout("large points", drawn, &[r, r, r, r]),
-            triangles: layout("triangles of trees", drawn, &[r, r, r, r, r, Kind::TextureArray, r]),
+            triangles: layout("triangles of trees", drawn, &[r, r, r, r, r, pages, r]),
+            sort: layout("sort", compute, &[w, w, w]),
+            impostors: layout("impostors", drawn, &[r, r, r, r, r, r, r, pages, pages, pages]),
         }
     }
 }
@@ -81,9 +87,11 @@ pub struct LandscapeRenderer {
     choose: ComputePipeline,
     splat: Vec<ComputePipeline>,
     between: [ComputePipeline; 3],
+    sort: [ComputePipeline; 2],
     resolve: RenderPipeline,
     large: RenderPipeline,
     triangles: RenderPipeline,
+    impostors: RenderPipeline,
 }
 
 impl LandscapeRenderer {
@@ -128,6 +136,8 @@ impl LandscapeRenderer {
         let splatting = [land, &layouts.splat, &targets.splat];
         let between = module(Step::Between);
         let step = |entry| compute(&between, entry, &[&layouts.steps], &[]);
+        let sorting = module(Step::Sort);
+        let sort = |entry| compute(&sorting, entry, &[&layouts.sort], &[]);
         let list = PrimitiveTopology::TriangleList;
         let plain = ["vertex", "fragment"];
         let renderer = Self {
@@ -145,6 +155,7 @@ impl LandscapeRenderer {
                 .map(|run| compute(&splat, "splat", &splatting, &[most, ("RUN", *run)]))
                 .collect(),
             between: [step("after_cull"), step("after_choose"), step("next_band")],
+            sort: [sort("places"), sort("sort")],
             resolve: pipeline::covering(
                 device,
                 &module(Step::Resolve),
@@ -154,6 +165,12 @@ impl LandscapeRenderer {
                 Step::Large,
                 &[land, &layouts.large],
                 ["large_vertex", "large_fragment"],
+                PrimitiveTopology::TriangleStrip,
+            ),
+            impostors: drawn(
+                Step::Impostors,
+                &[land, &layouts.impostors],
+                plain,
                 PrimitiveTopology::TriangleStrip,
             ),
             triangles: drawn(Step::Triangles, &[land, &layouts.triangles], plain, list),
@@ -243,6 +260,15 @@ impl LandscapeRenderer {
             }
             self.step(&mut pass, land, 2);
         }
+        if land.has_views {
+            let groups = (land.scene().trees.len() as u32).div_ceil(SORTED_AT_ONCE);
+            let across = groups.clamp(1, u16::MAX.into());
+            pass.set_bind_group(0, &land.impostors.sort_group, &[]);
+            pass.set_pipeline(&self.sort[0]);
+            pass.dispatch_workgroups(1, 1, 1);
+            pass.set_pipeline(&self.sort[1]);
+            pass.dispatch_workgroups(across, groups.div_ceil(across), 1);
+        }
     }
 
     fn draw_band(
@@ -304,6 +330,11 @@ impl LandscapeRenderer {
                 pass.set_bind_group(1, triangles.group(), &[]);
                 pass.draw_indirect(&land.draws, i * 16);
             }
+        }
+        if land.has_views {
+            pass.set_bind_group(1, &land.impostors.group, &[]);
+            pass.set_pipeline(&self.impostors);
+            pass.draw_indirect(&land.impostors.draw, 0);
         }
         pass.set_bind_group(1, &land.large_group, &[]);
         pass.set_pipeline(&self.large);

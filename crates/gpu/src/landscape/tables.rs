@@ -1,9 +1,13 @@
 //! What shaders know of the species: one table of each thing for all of them.
 
 use crate::error::GpuError;
+use crate::landscape::impostors::ViewTables;
+use crate::landscape::{IMPOSTOR_FADE, LandscapeDetail};
 use bytemuck::{Pod, Zeroable};
 use forest_points::{CellRecord, Order, PointsBlock, SizeCode};
 use forest_scene::{Canopy, Species, Stance};
+use forest_soup::Camera;
+use forest_views::ViewsBlock;
 use glam::DVec3;
 
 /// `Species` of trees.wgsl.
@@ -30,6 +34,25 @@ pub(crate) struct SpeciesRecord {
     wide: f32,
     tall: f32,
     least_coarse: i32,
+    view_center: [f32; 3],
+    view_side: f32,
+    view_texels: f32,
+    view_most: f32,
+    view_levels: u32,
+    first_level: u32,
+    first_frame: u32,
+    first_compass: u32,
+    zero: [u32; 2],
+}
+
+impl SpeciesRecord {
+    /// Metres from which its trees are drawn by views alone; infinity without views.
+    pub(crate) fn drawn_by_views_from(&self, camera: &Camera, detail: &LandscapeDetail) -> f64 {
+        let largest = f64::from(self.view_most) * detail.impostors * detail.finest.0.sqrt();
+        let most_scale = f64::from(self.least + self.step * SCALE_STEPS as f32);
+        let pixels = camera.pixels_per_unit(1.0) * f64::from(self.view_side) * most_scale;
+        if pixels > 0.0 { pixels / (IMPOSTOR_FADE * largest) } else { f64::INFINITY }
+    }
 }
 
 /// `Stock` of trees.wgsl.
@@ -58,6 +81,7 @@ pub(crate) struct Tables {
     pub(crate) radii: Vec<f32>,
     pub(crate) prefixes: Vec<u32>,
     pub(crate) triangle_sizes: Vec<u32>,
+    pub(crate) views: ViewTables,
     points: u32,
 }
 
@@ -75,7 +99,12 @@ impl Tables {
     ///
     /// # Errors
     /// When the pack is in the paper's order, which has no valid cut.
-    pub(crate) fn add(&mut self, species: &Species, block: &PointsBlock) -> Result<(), GpuError> {
+    pub(crate) fn add(
+        &mut self,
+        species: &Species,
+        block: &PointsBlock,
+        views: Option<&ViewsBlock<'_>>,
+    ) -> Result<(), GpuError> {
         if block.header.order != Order::Exact {
             let pack = species.pack.path().display().to_string();
             return Err(GpuError::Missing { pack, what: "points in the exact order".into() });
@@ -101,6 +130,7 @@ impl Tables {
         );
         self.triangle_sizes.extend(block.triangles.iter().map(|t| u32::from(t.size)));
         let canopy = Canopy::new(block, stance, CANOPY_POINTS);
+        let views = views.map_or_else(Default::default, |v| self.views.add(v, stance));
         let below = block.cells.iter().filter(|c| !c.is_top());
         self.species.push(SpeciesRecord {
             center: ((min + max) * 0.5).as_vec3().to_array(),
@@ -123,6 +153,15 @@ impl Tables {
             wide: ((max - min).with_y(0.0).length() * 0.5) as f32,
             tall: ((max.y - min.y) * 0.5) as f32,
             least_coarse,
+            view_center: views.center,
+            view_side: views.side,
+            view_texels: views.texels,
+            view_most: views.most,
+            view_levels: views.levels,
+            first_level: views.first_level,
+            first_frame: views.first_frame,
+            first_compass: views.first_compass,
+            zero: [0; 2],
         });
         self.points += block.points.len() as u32;
         Ok(())

@@ -29,12 +29,6 @@ struct Sprite {
     page: vec2u,
 }
 
-struct ViewFrame {
-    right: vec4f,
-    up: vec4f,
-    back: vec4f,
-}
-
 @group(1) @binding(0) var<uniform> sprite: Sprite;
 @group(1) @binding(1) var<storage, read> tiles: array<vec4u>;
 @group(1) @binding(2) var<storage, read> view_frames: array<ViewFrame>;
@@ -73,31 +67,6 @@ fn ray_of(at: vec2f) -> Ray {
         return Ray(sprite.eye + aside / sprite.half, frame.forward, -3.0e38);
     }
     return Ray(sprite.eye, normalize(frame.forward + aside), 0.0);
-}
-
-// The stored part of a tile.
-struct Tile {
-    // In the whole tile.
-    corner: vec2i,
-    size: vec2i,
-    // Where it lies.
-    page: vec3i,
-}
-
-fn tile_of(view: u32) -> Tile {
-    let t = tiles[view];
-    let corner = vec2i(i32(t.z << 16u) >> 16u, i32(t.z) >> 16u);
-    let size = vec2i(i32(t.w & 0xffffu), i32(t.w >> 16u));
-    return Tile(corner, size, vec3i(i32(t.x & 0xffffu), i32(t.x >> 16u), i32(t.y & 0xffffu)));
-}
-
-// Texel of the pages that texel `at` of a whole tile is: x, y, page; negative where nothing is stored.
-fn page_texel(t: Tile, at: vec2i) -> vec3i {
-    let p = at - t.corner;
-    if any(p < vec2i(0)) || any(p >= t.size) {
-        return vec3i(-1);
-    }
-    return t.page + vec3i(p, 0);
 }
 
 // Depth of a texel of the pages: 0 at the front of the ball, 1 at its back.

@@ -27,6 +27,8 @@ struct Runs {
 // Of each species, the arguments of its draw: vertices, runs, zeros.
 @group(1) @binding(13) var<storage, read_write> draws: array<atomic<u32>>;
 
+@group(1) @binding(14) var<storage, read_write> boards: Boards;
+
 // A tree each: what is far is drawn at once or put down as one cell, what is near is listed.
 @compute @workgroup_size(TILE)
 fn cull(
@@ -49,18 +51,29 @@ fn cull(
     if distance < bitcast<f32>(band.z) || distance >= bitcast<f32>(band.w) || is_beside(center, radius) {
         return;
     }
-    let share = cylinder_open(center, s.wide * t.scale, s.tall * t.scale);
+    let board = board_of(t, s);
+    let asks = board.share < 1.0;
+    let share = cylinder_open(center, s.wide * t.scale, s.tall * t.scale, asks);
     if share == 0.0 {
         return;
     }
-    if RUN == 0u {
-        atomicAdd(&work.trees, 1u);
+    if board.share > 0.0 {
+        if RUN == 0u {
+            put_board(index, distance);
+        }
+        if board.share >= 1.0 {
+            return;
+        }
     }
     // Of far trees, what others hide is left out by height.
     let visible = visible_from(t, s);
     if visible.y == 0.0 {
         return;
     }
+    if RUN == 0u && board.share == 0.0 {
+        atomicAdd(&work.trees, 1u);
+    }
+    let fade = vec2f(board.share, 1.0);
     let unit = pixels(t, s.block_unit, length(place_of(t, s.origin)));
     let fine = there(code_at_most(finest_seen(share * visible.y) / (unit * unit)), s.least_fine);
     if fine < s.root_parent {
@@ -80,33 +93,55 @@ fn cull(
         if RUN == 0u {
             atomicAdd(&work.points, count);
         }
-        splat_few(t, s, stock, fine, count, visible.x);
+        splat_few(t, s, stock, fine, count, visible.x, fade);
         return;
     }
     if RUN == 0u {
         atomicAdd(&work.points, count);
         // Nothing stands in for a surfel, however large.
-        let cell = put_cell(t, s, stock, fine, 4094, visible.x);
+        let cell = put_cell(t, s, stock, fine, 4094, visible.x, fade);
         if cell >= 0 {
             put_points(u32(cell), stock.first_point, count);
         }
     }
 }
 
+fn put_board(tree: u32, distance: f32) {
+    let slot = atomicAdd(&boards.count, 1u);
+    let bucket = u32(clamp(log2(distance) * BUCKETS_PER_OCTAVE, 0.0, f32(BUCKETS - 1u)));
+    atomicAdd(&boards.buckets[bucket], 1u);
+    boards.found[slot] = vec2u(tree, bucket);
+    atomicAdd(&work.trees, 1u);
+    atomicAdd(&work.impostors, 1u);
+}
+
 // Parts of a tree's height that are looked at one by one.
 const SLICES = 4u;
+
+// Metres of the way from a place of a tree to the eye that are beside its own crown rather than behind it,
+// though the map's texels hold that crown: all of them unless the way rises by half the tree's height on
+// them, none where it rises by all of it.
+fn own_way(t: Tree, s: Species, place: vec3f) -> f32 {
+    let out = s.wide * t.scale + land.sky.texel;
+    let aside = max(length(place.xz), 1e-3 * length(place));
+    let rise = out * max(-place.y, 0.0) / aside;
+    return out * length(place) / aside * clamp(2.0 - rise / (s.tall * t.scale), 0.0, 1.0);
+}
 
 // Height from the eye above which some of a tree may be seen, and the largest share that may be.
 fn visible_from(t: Tree, s: Species) -> vec2f {
     let middle = place_of(t, s.center);
     let tall = s.tall * t.scale;
+    let own = own_way(t, s, middle);
+    let slice = 2.0 * tall / f32(SLICES);
     var cut = 3.0e38;
     var most = 0.0;
     for (var k = SLICES; k > 0u; k--) {
-        let low = middle.y - tall + 2.0 * tall * f32(k - 1u) / f32(SLICES);
-        let place = vec3f(middle.x, low + tall / f32(SLICES), middle.z);
-        let through = exp(-depth_to_eye(place));
-        if through >= LEAST_THROUGH_TREES {
+        let low = middle.y - tall + slice * f32(k - 1u);
+        // Slices by their middles; the uppermost by its upper end, that no tree hides itself.
+        let at = low + slice * select(0.5, 1.0, k == SLICES);
+        let through = exp(-depth_to_eye(vec3f(middle.x, at, middle.z), own));
+        if through >= land.least_seen {
             cut = low;
             most = max(most, through);
         }
@@ -120,13 +155,13 @@ const LEAST_RADIUS = 0.5642;
 
 // A few points, at once. What is smaller than a pixel is as likely to be seen as it would cover its
 // middle: it is drawn a pixel large, and as much less opaque.
-fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32) {
+fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32, fade: vec2f) {
     let cell = Cell(
         place_of(t, stock.origin),
         stock.step * t.scale,
         fine,
         4094,
-        vec2f(0.0, 1.0),
+        fade,
         t.turn,
         s.unit * t.scale,
         s.first_code,
@@ -165,7 +200,7 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32)
             continue;
         }
         let color = point_color(cell.turn, cell.clump, p, e.center, e.depth).rgb;
-    splat_box(e, point_number(cell, index), cell.fade, box, pack_color(color));
+        splat_box(e, point_number(cell, index), cell.fade, box, pack_color(color));
     }
 }
 
@@ -227,6 +262,7 @@ fn choose(
     let t = tree_of(near.x);
     let s = species_table[t.species];
     let block_fine = i32(near.y) - 1;
+    let fade = vec2f(board_of(t, s).share, 1.0);
     for (var i = lane; i < s.cells; i += 64u) {
         let stock = stocks[s.first_cell + i];
         let is_top = stock.is_top != 0u;
@@ -243,11 +279,10 @@ fn choose(
             continue;
         }
         // What trees have before the cell, itself among them. (The paper adds k·Z to the threshold.)
-        let through = exp(-depth_to_eye(center));
-        if through < LEAST_THROUGH_TREES {
+        if exp(-depth_to_eye(center, own_way(t, s, center))) < land.least_seen {
             continue;
         }
-        share *= through;
+        share *= exp(-depth_to_eye(center, 0.0));
         let here = pixels(t, s.block_unit, length(center));
         let finest = finest_seen(share);
         let code = there(code_at_most(finest / (here * here)), s.least_fine);
@@ -263,7 +298,7 @@ fn choose(
         if count + triangles == 0u {
             continue;
         }
-        let cell = put_cell(t, s, stock, fine, coarse, -3.0e38);
+        let cell = put_cell(t, s, stock, fine, coarse, -3.0e38, fade);
         if cell < 0 {
             continue;
         }

@@ -31,6 +31,13 @@ struct Land {
     zenith: vec3f,
     // Power of the share that is seen: thresholds grow by it.
     hidden: f32,
+    // Samples along the side of a pixel.
+    pixel: f32,
+    // How many times as large as one as fine as points an impostor may be.
+    impostors: f32,
+    // What less light than this comes through to the eye from is left out.
+    least_seen: f32,
+    zero: f32,
 }
 
 @group(0) @binding(1) var<uniform> land: Land;
@@ -116,11 +123,13 @@ fn seen_at(off: vec3f) -> vec2f {
     ));
 }
 
-// Optical depth of the trees between a place from the eye and the eye: the sky's map holds how dense they
-// are, by height. `VIEW_STEPS` places are asked on the way, the more the nearer.
-fn depth_to_eye(off: vec3f) -> f32 {
-    let distance = length(off);
-    let toward = -off / distance;
+// Optical depth of the trees between a place from the eye and the eye, of which the first `own` metres do
+// not count: the sky's map holds how dense they are, by height. `VIEW_STEPS` places are asked on the way,
+// the more the nearer.
+fn depth_to_eye(place: vec3f, own: f32) -> f32 {
+    let toward = -normalize(place);
+    let off = place + toward * own;
+    let distance = max(length(place) - own, 0.0);
     // No farther than up to the highest tree.
     let high = land.sky.low + 65535.0 / land.sky.steps - (off.y + land.eye.y);
     let rise = max(toward.y, 1e-4);

@@ -1,70 +1,4 @@
-// What the shaders of a forest share: its tables, and what may be left out of a picture.
-
-struct Species {
-    // Ball about a tree, from its foot, at scale 1.
-    center: vec3f,
-    radius: f32,
-    // Zero of its block, from its foot.
-    origin: vec3f,
-    // Metres of a block unit.
-    block_unit: f32,
-    // Least scale, and what is added for each step of it.
-    least: f32,
-    step: f32,
-    // Its cells; the last one is the block's own tree.
-    first_cell: u32,
-    cells: u32,
-    // Its size codes in `prefixes`, and its radii.
-    first_code: u32,
-    // Largest size code of a cell root's parent: from there on the block's own tree is all there is.
-    root_parent: i32,
-    // 1 if there are triangles.
-    has_triangles: u32,
-    // Metres of a unit of radii.
-    unit: f32,
-    // Its triangles in `triangle_sizes`.
-    first_triangle: u32,
-    // Of a pruned pack, codes below which nothing is there; −1.
-    least_fine: i32,
-    // Its runs of triangles, and how many there is room for.
-    first_run: u32,
-    runs: u32,
-    // Optical depth that a leaf has before it within its own clump.
-    clump: f32,
-    // Radius of the upright cylinder about `center` that holds a tree, and half its height.
-    wide: f32,
-    tall: f32,
-    least_coarse: i32,
-}
-
-// A cell of a species, in metres from the foot of a tree of scale 1.
-struct Stock {
-    origin: vec3f,
-    step: f32,
-    center: vec3f,
-    radius: f32,
-    first_point: u32,
-    points: u32,
-    // What is added to indices of points for their numbers.
-    number: u32,
-    root_parent: i32,
-    // In the species' own array.
-    first_triangle: u32,
-    triangles: u32,
-    is_top: u32,
-    // What is added to indices of triangles for their numbers.
-    triangle_number: u32,
-}
-
-// A tree as it stands before the eye.
-struct Tree {
-    species: u32,
-    // Its foot from the eye.
-    foot: vec3f,
-    turn: vec2f,
-    scale: f32,
-    mask: u32,
-}
+// What the shaders that choose share: their tables, and what may be left out of a picture.
 
 struct Work {
     // Which part of the tiles is looked at.
@@ -79,9 +13,10 @@ struct Work {
     left_out: atomic<u32>,
     // Trees and cells that ask for more than their pruned packs have.
     beyond: atomic<u32>,
+    // Trees that are drawn by views.
+    impostors: atomic<u32>,
     zero0: u32,
     zero1: u32,
-    zero2: u32,
     // Trees whose cells are chosen one by one, and largest size codes of their blocks' own trees.
     trees_near: array<vec2u>,
 }
@@ -93,24 +28,6 @@ struct Work {
 @group(1) @binding(7) var<storage, read_write> cells_out: array<Cell>;
 @group(1) @binding(8) var<storage, read_write> chunks_out: array<Chunk>;
 @group(1) @binding(9) var<storage, read> nearness: Nearness;
-
-fn tree_of(index: u32) -> Tree {
-    let record = instances[index];
-    var t: Tree;
-    t.species = record.w >> 24u;
-    let s = species_table[t.species];
-    t.scale = s.least + s.step * f32((record.w >> 12u) & 0xfffu);
-    let yaw = f32(record.w & 0xfffu) * (6.283185307179586 / 4096.0);
-    t.turn = vec2f(cos(yaw), sin(yaw));
-    t.foot = from_eye(bitcast<vec3f>(record.xyz));
-    // Two trees do not share the samples that they cover.
-    t.mask = mix_bits(index + 1u);
-    return t;
-}
-
-fn place_of(t: Tree, off: vec3f) -> vec3f {
-    return t.foot + turned(t.turn, off) * t.scale;
-}
 
 // Whether a ball is behind the eye, or all of it beside the picture.
 fn is_beside(center: vec3f, radius: f32) -> bool {
@@ -141,8 +58,9 @@ fn ball_open(center: vec3f, radius: f32) -> f32 {
     return open_share(vec2u(low), vec2u(high), depth_value(depth + radius));
 }
 
-// The same of an upright cylinder: trees are taller than they are wide.
-fn cylinder_open(center: vec3f, wide: f32, tall: f32) -> f32 {
+// The same of an upright cylinder: trees are taller than they are wide. Where no one asks for the share,
+// 1 for what may be seen.
+fn cylinder_open(center: vec3f, wide: f32, tall: f32, asks: bool) -> f32 {
     let depth = dot(center, frame.forward);
     let up = -frame.down.y * tall;
     // How far the cylinder reaches along the axes of the picture, and into it.
@@ -160,6 +78,9 @@ fn cylinder_open(center: vec3f, wide: f32, tall: f32) -> f32 {
     let b = vec2u(clamp(0.5 * frame.size + high, vec2f(0.0), frame.size - 1.0));
     if is_covered(a, b, depth_value(near)) {
         return 0.0;
+    }
+    if !asks {
+        return 1.0;
     }
     return open_share(a, b, depth_value(depth));
 }
@@ -186,13 +107,8 @@ fn there(code: i32, least: i32) -> i32 {
     return max(code, least);
 }
 
-// Pixels of a block unit at a distance.
-fn pixels(t: Tree, block_unit: f32, distance: f32) -> f32 {
-    return frame.scale / distance * block_unit * t.scale;
-}
-
 // The cell of a tree as it is drawn above height `cut` from the eye; -1 if there is no room.
-fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32, cut: f32) -> i32 {
+fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32, cut: f32, fade: vec2f) -> i32 {
     let slot = atomicAdd(&work.cells, 1u);
     if slot >= arrayLength(&cells_out) {
         atomicAdd(&work.left_out, 1u);
@@ -203,7 +119,7 @@ fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32, cut: f32)
         stock.step * t.scale,
         fine,
         coarse,
-        vec2f(0.0, 1.0),
+        fade,
         t.turn,
         s.unit * t.scale,
         s.first_code,

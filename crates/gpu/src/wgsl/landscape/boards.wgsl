@@ -1,0 +1,12 @@
+// Trees that are drawn as impostors, as they are found.
+
+struct Boards {
+    count: atomic<u32>,
+    zero0: u32,
+    zero1: u32,
+    zero2: u32,
+    // How many there are by distance; then where those of each bucket go.
+    buckets: array<atomic<u32>, BUCKETS>,
+    // Tree and bucket.
+    found: array<vec2u>,
+}

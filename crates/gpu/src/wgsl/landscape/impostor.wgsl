@@ -1,0 +1,156 @@
+// Far trees: a quad each, whose samples are those of three views around the direction to the eye, each
+// with its share (forest_views::Lookup::Blend).
+
+struct Level {
+    first_tile: u32,
+    // 1: normals, 2: depth are there.
+    flags: u32,
+    // Along the side of a tile.
+    texels: f32,
+    // Radius of the ball that holds the tree, in units of half a tile.
+    reach: f32,
+}
+
+@group(1) @binding(0) var<storage, read> instances: array<vec4u>;
+@group(1) @binding(1) var<storage, read> species_table: array<Species>;
+// The nearest first.
+@group(1) @binding(2) var<storage, read> sorted: array<u32>;
+@group(1) @binding(3) var<storage, read> levels: array<Level>;
+@group(1) @binding(4) var<storage, read> tiles: array<vec4u>;
+@group(1) @binding(5) var<storage, read> view_frames: array<ViewFrame>;
+// By direction, three views of 16 bits and the shares of the first two of 8.
+@group(1) @binding(6) var<storage, read> compass: array<vec2u>;
+@group(1) @binding(7) var color_pages: texture_2d_array<f32>;
+@group(1) @binding(8) var normal_pages: texture_2d_array<f32>;
+@group(1) @binding(9) var depth_pages: texture_2d_array<f32>;
+
+struct Corner {
+    @builtin(position) position: vec4f,
+    // Texel of the whole tile of each view; the views' tiles.
+    @location(0) at: vec4f,
+    @location(1) at_last: vec2f,
+    // Place of the tree's middle plane from the eye, and what a height of 1 adds.
+    @location(2) place: vec3f,
+    @location(9) @interpolate(flat) rise: vec3f,
+    // Axes of the view that would be seen from the eye.
+    @location(10) @interpolate(flat) right: vec3f,
+    @location(11) @interpolate(flat) up: vec3f,
+    @location(12) @interpolate(flat) toward: vec3f,
+    @location(3) @interpolate(flat) views: vec3u,
+    @location(4) @interpolate(flat) shares: vec2f,
+    // Of its level.
+    @location(5) @interpolate(flat) flags: u32,
+    // Of the hash rule; share of the samples; what is left of light within a clump.
+    @location(6) @interpolate(flat) mask: u32,
+    @location(7) @interpolate(flat) share: f32,
+    @location(8) @interpolate(flat) clump: f32,
+}
+
+// Where a ray from the eye through `direction` meets a view's tile.
+fn tile_at(v: ViewFrame, center: vec3f, direction: vec3f, half: f32) -> vec2f {
+    let toward = dot(direction, v.back.xyz);
+    let off = direction * (dot(center, v.back.xyz) / min(toward, -0.05)) - center;
+    let at = vec2f(dot(off, v.right.xyz), -dot(off, v.up.xyz)) / half;
+    return 0.5 * at + 0.5;
+}
+
+// First and last place of what a view shows, from −1 to 1 on its tile.
+fn shown(view: u32, texels: f32) -> vec4f {
+    let tile = tile_of(view);
+    let low = vec2f(tile.corner) * (2.0 / texels) - 1.0;
+    return vec4f(low, low + vec2f(tile.size) * (2.0 / texels));
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: u32) -> Corner {
+    let t = tree_of(sorted[instance]);
+    let s = species_table[t.species];
+    let center = place_of(t, s.view_center);
+    let toward = -normalize(center);
+    var out: Corner;
+    out.toward = toward;
+    out.right = normalize(vec3f(toward.z, 0.0, -toward.x));
+    out.up = cross(toward, out.right);
+    // In the tree's own frame.
+    let back = vec2f(t.turn.x, -t.turn.y);
+    let from_tree = turned(back, toward);
+    let row = (asin(clamp(from_tree.y, -1.0, 1.0)) / HALF_TURN + 0.5) * f32(COMPASS_UP);
+    let column = (atan2(from_tree.x, from_tree.z) / HALF_TURN * 0.5 + 0.5) * f32(COMPASS_AROUND);
+    let cell = min(u32(row), COMPASS_UP - 1u) * COMPASS_AROUND + u32(column) % COMPASS_AROUND;
+    let found = compass[s.first_compass + cell];
+    let views = vec3u(found.x & 0xffffu, found.x >> 16u, found.y & 0xffffu);
+    let first = f32((found.y >> 16u) & 0xffu) / 255.0;
+    out.shares = vec2f(first, first + f32(found.y >> 24u) / 255.0);
+    // The quad holds what the three show at the finest level.
+    let finest = levels[s.first_level];
+    let a = shown(finest.first_tile + views.x, finest.texels);
+    let b = shown(finest.first_tile + views.y, finest.texels);
+    let c = shown(finest.first_tile + views.z, finest.texels);
+    let low = min(min(a.xy, b.xy), c.xy);
+    let high = max(max(a.zw, b.zw), c.zw);
+    let corner = mix(low, high, vec2f(f32(index & 1u), f32(index >> 1u)));
+    let half = 0.5 * s.view_side * t.scale;
+    out.place = center + (out.right * corner.x - out.up * corner.y) * half;
+    let at = project(out.place);
+    // It stands about the tree's axis.
+    let tall = s.tall * t.scale;
+    let height = clamp(-corner.y * half / max(out.up.y, 0.1), -tall, tall);
+    let depth = dot(center, frame.forward) + height * frame.forward.y;
+    out.position = flat_clip(at.xy, depth_value(depth));
+    let board = board_of(t, s);
+    let level = levels[s.first_level + board.level];
+    let local = turned(back, center);
+    let ray = turned(back, out.place);
+    let frames = s.first_frame + views;
+    out.at = level.texels * vec4f(
+        tile_at(view_frames[frames.x], local, ray, half),
+        tile_at(view_frames[frames.y], local, ray, half),
+    );
+    out.at_last = level.texels * tile_at(view_frames[frames.z], local, ray, half);
+    out.views = views + level.first_tile;
+    out.flags = level.flags;
+    out.rise = toward * (half * level.reach);
+    out.mask = t.mask;
+    out.share = board.share;
+    out.clump = exp(-s.clump);
+    return out;
+}
+
+@fragment
+fn fragment(in: Corner) -> @location(0) vec4f {
+    let sample = vec2u(in.position.xy);
+    if !fades_in(vec2f(0.0, in.share), sample) {
+        discard;
+    }
+    let pick = sample_hash(PICK ^ in.mask, sample);
+    var view = in.views.x;
+    var at = in.at.xy;
+    if pick >= in.shares.y {
+        view = in.views.z;
+        at = in.at_last;
+    } else if pick >= in.shares.x {
+        view = in.views.y;
+        at = in.at.zw;
+    }
+    let p = page_texel(tile_of(view), vec2i(floor(at)));
+    if p.x < 0 {
+        discard;
+    }
+    let color = textureLoad(color_pages, p.xy, p.z, 0);
+    if !covers(COVER ^ in.mask, sample, u32(color.a * 255.0 + 0.5)) {
+        discard;
+    }
+    // Views differ from what the eye sees by a few degrees: their heights and normals are taken for those
+    // towards the eye.
+    var normal = in.toward;
+    if (in.flags & 1u) != 0u {
+        let n = textureLoad(normal_pages, p.xy, p.z, 0).xy * 2.0 - 1.0;
+        normal = in.right * n.x + in.up * n.y + in.toward * sqrt(max(1.0 - dot(n, n), 0.0));
+    }
+    var height = 0.0;
+    if (in.flags & 2u) != 0u {
+        height = 1.0 - 2.0 * textureLoad(depth_pages, p.xy, p.z, 0).x;
+    }
+    let seen = seen_at(in.place + in.rise * height) * in.clump;
+    return vec4f(color.rgb * light(normal, seen.x, seen.y * skyward(normal)), 1.0);
+}

@@ -1,0 +1,128 @@
+// Trees of a landscape as they stand before the eye. The arrays are each shader's own.
+
+struct Species {
+    // Ball about a tree, from its foot, at scale 1.
+    center: vec3f,
+    radius: f32,
+    // Zero of its block, from its foot.
+    origin: vec3f,
+    // Metres of a block unit.
+    block_unit: f32,
+    // Least scale, and what is added for each step of it.
+    least: f32,
+    step: f32,
+    // Its cells; the last one is the block's own tree.
+    first_cell: u32,
+    cells: u32,
+    // Its size codes in `prefixes`, and its radii.
+    first_code: u32,
+    // Largest size code of a cell root's parent: from there on the block's own tree is all there is.
+    root_parent: i32,
+    // 1 if there are triangles.
+    has_triangles: u32,
+    // Metres of a unit of radii.
+    unit: f32,
+    // Its triangles in `triangle_sizes`.
+    first_triangle: u32,
+    // Of a pruned pack, codes below which nothing is there; −1.
+    least_fine: i32,
+    // Its runs of triangles, and how many there is room for.
+    first_run: u32,
+    runs: u32,
+    // Optical depth that a leaf has before it within its own clump.
+    clump: f32,
+    // Radius of the upright cylinder about `center` that holds a tree, and half its height.
+    wide: f32,
+    tall: f32,
+    least_coarse: i32,
+    // Middle of its views' tiles, from its foot, and their side in metres; 0 without views.
+    view_center: vec3f,
+    view_side: f32,
+    // Texels along the side of a tile at the finest level, and how many pixels large it may be if a pixel
+    // may be off by one.
+    view_texels: f32,
+    view_most: f32,
+    // Its levels, frames and compass among those of all species.
+    view_levels: u32,
+    first_level: u32,
+    first_frame: u32,
+    first_compass: u32,
+    zero0: u32,
+    zero1: u32,
+}
+
+// A cell of a species, in metres from the foot of a tree of scale 1.
+struct Stock {
+    origin: vec3f,
+    step: f32,
+    center: vec3f,
+    radius: f32,
+    first_point: u32,
+    points: u32,
+    // What is added to indices of points for their numbers.
+    number: u32,
+    root_parent: i32,
+    // In the species' own array.
+    first_triangle: u32,
+    triangles: u32,
+    is_top: u32,
+    // What is added to indices of triangles for their numbers.
+    triangle_number: u32,
+}
+
+// A tree as it stands before the eye.
+struct Tree {
+    species: u32,
+    // Its foot from the eye.
+    foot: vec3f,
+    turn: vec2f,
+    scale: f32,
+    mask: u32,
+}
+
+fn tree_of(index: u32) -> Tree {
+    let record = instances[index];
+    var t: Tree;
+    t.species = record.w >> 24u;
+    let s = species_table[t.species];
+    t.scale = s.least + s.step * f32((record.w >> 12u) & 0xfffu);
+    let yaw = f32(record.w & 0xfffu) * (6.283185307179586 / 4096.0);
+    t.turn = vec2f(cos(yaw), sin(yaw));
+    t.foot = from_eye(bitcast<vec3f>(record.xyz));
+    // Two trees do not share the samples that they cover.
+    t.mask = mix_bits(index + 1u);
+    return t;
+}
+
+fn place_of(t: Tree, off: vec3f) -> vec3f {
+    return t.foot + turned(t.turn, off) * t.scale;
+}
+
+// Pixels of a block unit at a distance.
+fn pixels(t: Tree, block_unit: f32, distance: f32) -> f32 {
+    return frame.scale / distance * block_unit * t.scale;
+}
+
+struct Board {
+    // Of the samples that a tree is drawn by as an impostor.
+    share: f32,
+    level: u32,
+}
+
+// What a tree shows of its views from its distance.
+fn board_of(t: Tree, s: Species) -> Board {
+    if s.view_side == 0.0 {
+        return Board(0.0, 0u);
+    }
+    // In pixels, as thresholds are areas of samples.
+    let pixel = land.pixel;
+    let side = frame.scale / (pixel * length(place_of(t, s.view_center))) * s.view_side * t.scale;
+    let largest = land.impostors * s.view_most * sqrt(land.finest) / pixel;
+    if side < LEAST_IMPOSTOR || side >= largest {
+        return Board(0.0, 0u);
+    }
+    let share = min((1.0 - side / largest) / (1.0 - IMPOSTOR_FADE), 1.0);
+    // Texels of a pixel, or the next larger or smaller.
+    let level = round(log2(s.view_texels / side));
+    return Board(share, u32(clamp(level, 0.0, f32(s.view_levels - 1u))));
+}
