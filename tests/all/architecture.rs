@@ -61,7 +61,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "forest-scene",
         ],
     ),
-    ("forest-scene", &["forest-soup", "forest-raster", "forest-pack", "forest-points", "forest-views"]),
+    (
+        "forest-scene",
+        &["forest-soup", "forest-raster", "forest-pack", "forest-points", "forest-views"],
+    ),
     ("forest-sample-data", &["forest-soup"]),
     (
         "forest-view",

@@ -433,6 +433,41 @@ fn pruned_packs_draw_the_same_frames_within_the_need() {
 }
 
 #[test]
+fn pruned_views_draw_the_same_frames_within_the_need() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let path = make_of(packs_with_views(), dir.path(), 2000, &[]);
+    // From above alone: no tree is larger than a few pixels.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (head, _) = text.split_once("[[camera]]").unwrap();
+    let camera = "[[camera]]\nname = \"high\"\nat = [0.0, 150.0]\nabove = 140.0\npitch = -40.0\n";
+    std::fs::write(&path, format!("{head}{camera}")).unwrap();
+    let folder = dir.path().join("lean");
+    let line = ["needs", &arg(&path), "-o", &arg(&folder), "--height", "180", "--finest", "1"];
+    let text = succeed(&line);
+    assert!(text.lines().all(|l| l.contains("levels of views")), "{text}");
+    let whole = Scene::open(&path).unwrap();
+    let lean = Scene::open(&folder.join("forest.toml")).unwrap();
+    let mut saved = 0;
+    for (a, b) in whole.species.iter().zip(&lean.species) {
+        let [full, kept] = [a, b].map(|s| s.views().unwrap().unwrap().header);
+        assert!(kept.levels.len() < full.levels.len() && !kept.channels.sky, "{kept:?}");
+        saved += usize::from(kept.levels[0].texels < full.levels[0].texels);
+        let [before, after] = [a, b].map(|s| size_of(s.pack.path()));
+        assert!(after * 4 < before, "{after} of {before} bytes");
+    }
+    assert!(saved > 0, "all have their finest level");
+    let camera = whole.file.camera(None).unwrap().camera(&whole.land, [320, 180]);
+    for hidden in [0.0, 2.0 / 3.0] {
+        let finest = PixelArea(1.0);
+        let detail = LandscapeDetail { finest, hidden, ..LandscapeDetail::default() };
+        let [a, b] = [&whole, &lean].map(|s| draw(&gpu, s, &camera, &detail, false, 1));
+        assert!(a.counts.impostors * 2 > a.counts.trees, "{:?}", a.counts);
+        assert_eq!(a.counts, b.counts);
+        assert!(a.pixels == b.pixels, "another frame, hidden {hidden}");
+    }
+}
+
+#[test]
 fn a_pruned_pack_is_drawn_as_the_whole_one_from_its_nearest_distance_on() {
     let dir = tempfile::tempdir().unwrap();
     let folder = arg(&dir.path().join("lean"));

@@ -3,9 +3,12 @@
 use crate::failure::Usage;
 use crate::output;
 use anyhow::{Context, Result};
-use forest_pack::{Pack, PackWriter, SectionId, kind};
-use forest_points::{PointsBlock, PointsNeed, PruneReport, Thresholds, prune};
-use forest_scene::{Scene, points_needs, write_file};
+use forest_pack::{Pack, PackWriter, kind};
+use forest_points::{PixelArea, PointsBlock, PointsNeed, PruneReport, Thresholds, prune};
+use forest_scene::{Fineness, Scene, SpeciesNeed, needs, write_file};
+use forest_soup::{Camera, Projection};
+use forest_views::{Channels, Lookup, ViewsBlock};
+use glam::DVec3;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -35,6 +38,13 @@ pub(crate) struct Args {
     /// s_M that is asked for; default: 16 times s_m.
     #[arg(long, value_name = "PX2")]
     largest: Option<f64>,
+    /// Scenes: how many times as large as they are as fine as points views may be drawn, as for forest-view;
+    /// 0 for points alone, which leaves the views out.
+    #[arg(long, default_value_t = 1.0, value_name = "TIMES")]
+    impostors: f64,
+    /// Packs: largest size of a view's texel in pixels that is asked for.
+    #[arg(long, default_value_t = 1.0, value_name = "PX")]
+    texel: f64,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -50,6 +60,8 @@ struct Row {
     bytes: [u64; 2],
     #[serde(flatten)]
     kept: PruneReport,
+    /// Levels of views of the pack and of the pruned one.
+    view_levels: [usize; 2],
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -81,11 +93,13 @@ fn thresholds(args: &Args) -> Result<[f64; 2]> {
     Ok([args.finest, largest])
 }
 
-/// Prunes all packs of a scene, and writes the scene anew. Landscapes are drawn of points: views and
-/// volumes are left out.
+/// Prunes all packs of a scene, and writes the scene anew. Landscapes are drawn of points, triangles and
+/// views: volumes are left out.
 fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Vec<Row>> {
     let scene = Scene::open(path)?;
-    let needs = points_needs(&scene, args.height, thresholds);
+    let [finest, largest] = thresholds.map(PixelArea);
+    let drawn = Fineness { height: args.height, finest, largest, impostors: args.impostors };
+    let needs = needs(&scene, &drawn)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let whole = |p: &PathBuf| std::path::absolute(folder.join(p)).unwrap_or_else(|_| p.clone());
     let mut file = scene.file.clone();
@@ -96,7 +110,13 @@ fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Vec<Row>> 
     for (i, (species, need)) in scene.species.iter().zip(&needs).enumerate() {
         let stem = species.pack.path().file_name().context("a pack without a name")?;
         let name = format!("{i}-{}", stem.to_string_lossy());
-        rows.push(write(args, &species.pack, &name, need, &|k| k < kind::VIEWS_HEADER)?);
+        rows.push(write(
+            args,
+            &species.pack,
+            &name,
+            need,
+            Channels { sky: false, ..Channels::ALL },
+        )?);
         file.species[i].pack = PathBuf::from(name);
         // As the whole pack has it: its box stays, but be sure.
         file.species[i].anchor = Some(species.stance.anchor.to_array());
@@ -111,22 +131,36 @@ fn of_packs(args: &Args, packs: &[PathBuf], [finest, largest]: [f64; 2]) -> Resu
     let tall = 2.0 * (args.fov.to_radians() * 0.5).tan() * nearest;
     let pixels = f64::from(args.height) / tall;
     let area = |px: f64| px / (pixels * pixels);
-    let need = PointsNeed { finest: area(finest), largest: area(largest) };
+    let points = PointsNeed { finest: area(finest), largest: area(largest) };
     let one = |path: &PathBuf| {
         let pack = Pack::open(path)?;
         let name = path.file_name().context("a pack without a name")?.to_string_lossy();
-        write(args, &pack, &name, &need, &|_| true)
+        let views = match ViewsBlock::is_in(&pack) {
+            true => Some(levels(&ViewsBlock::open(&pack)?, nearest, args)),
+            false => None,
+        };
+        write(args, &pack, &name, &SpeciesNeed { points, views }, Channels::ALL)
     };
     packs.iter().map(one).collect()
 }
 
-/// Writes a pruned pack; of sections that are not of points those whose kind is wanted.
+/// The levels of views that a camera draws whose eye is so far from the tree's box, or farther.
+fn levels(views: &ViewsBlock, nearest: f64, args: &Args) -> std::ops::Range<usize> {
+    let projection = Projection::Perspective { fov_y: args.fov.to_radians() };
+    let eye = views.center() + DVec3::Z * nearest;
+    let camera = Camera::new(eye, -DVec3::Z, projection, [args.height; 2]);
+    let finest = forest_views::select(views, &camera, Lookup::Nearest, args.texel).level;
+    finest..views.header.levels.len()
+}
+
+/// Writes a pruned pack: of its views, these channels. Volumes stay where they may be drawn: in packs
+/// that no scene names.
 fn write(
     args: &Args,
     pack: &Pack,
     name: &str,
-    need: &PointsNeed,
-    wanted: &dyn Fn(u16) -> bool,
+    need: &SpeciesNeed,
+    channels: Channels,
 ) -> Result<Row> {
     let target = args.output.join(name);
     if target.exists() && !args.force {
@@ -135,14 +169,28 @@ fn write(
     }
     let block = PointsBlock::open(pack)?;
     let mut writer = PackWriter::create(&target)?;
-    let kept = prune(pack, &block, need, &mut writer)?;
-    let own = |id: &SectionId| (kind::POINTS_HEADER..kind::VIEWS_HEADER).contains(&id.kind);
-    for (id, _) in pack.sections().filter(|(id, _)| !own(id) && wanted(id.kind)) {
+    let kept = prune(pack, &block, &need.points, &mut writer)?;
+    let mut view_levels = [0; 2];
+    if ViewsBlock::is_in(pack) {
+        let views = ViewsBlock::open(pack)?;
+        view_levels[0] = views.header.levels.len();
+        if let Some(levels) = &need.views {
+            view_levels[1] = levels.len();
+            forest_views::prune(&views, levels.clone(), channels, &mut writer)?;
+        }
+    }
+    let of_scene = args.nearest.is_none();
+    let rest = |kind: u16| match kind {
+        kind::POINTS_HEADER..kind::VOLUME_HEADER => false,
+        kind::VOLUME_HEADER.. => !of_scene,
+        _ => true,
+    };
+    for (id, _) in pack.sections().filter(|(id, _)| rest(id.kind)) {
         writer.copy(pack, id)?;
     }
     writer.finish()?;
     let bytes = [pack.file_length(), std::fs::metadata(&target)?.len()];
-    Ok(Row { pack: target.display().to_string(), bytes, kept })
+    Ok(Row { pack: target.display().to_string(), bytes, kept, view_levels })
 }
 
 fn table(rows: &[Row]) -> Result<String, std::fmt::Error> {
@@ -151,9 +199,13 @@ fn table(rows: &[Row]) -> Result<String, std::fmt::Error> {
         let part =
             |[all, kept]: [u64; 2]| format!("{} of {}", output::count(kept), output::count(all));
         let [before, after] = r.bytes;
+        let views = match r.view_levels {
+            [0, _] => String::new(),
+            [all, kept] => format!(", levels of views {kept} of {all}"),
+        };
         writeln!(
             text,
-            "{}: {} of {}; points {}, triangles {}",
+            "{}: {} of {}; points {}, triangles {}{views}",
             r.pack,
             output::bytes(after),
             output::bytes(before),

@@ -152,8 +152,8 @@ fn constants() -> String {
     let floats = [
         ("HALF_TURN", std::f64::consts::PI),
         ("BUCKETS_PER_OCTAVE", f64::from(landscape::BUCKETS_PER_OCTAVE)),
-        ("IMPOSTOR_FADE", landscape::IMPOSTOR_FADE),
-        ("LEAST_IMPOSTOR", landscape::LEAST_IMPOSTOR),
+        ("IMPOSTOR_FADE", forest_scene::IMPOSTOR_FADE),
+        ("LEAST_IMPOSTOR", forest_scene::LEAST_IMPOSTOR),
         ("DIFFUSE", forest_scene::DIFFUSE),
         ("DEPTH_STEPS", f64::from(forest_scene::DEPTH_STEPS)),
         ("LEAST_SHARE", landscape::LEAST_SHARE),

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 const MAP_SIDE: u32 = 2048;
 const MAP_TEXEL: f64 = 1.0;
 
-/// Points that stand for a tree in the opacity maps: a few a texel of its own width.
-const CANOPY: std::ops::RangeInclusive<f64> = 8.0..=256.0;
+/// Points that stand for a tree in the opacity maps at least: a few a texel of its own width.
+const LEAST_CANOPY: f64 = 8.0;
 
 /// A landscape and its trees.
 #[derive(Debug)]
@@ -73,7 +73,7 @@ impl Scene {
         let canopy = |species: &Species| -> Result<Canopy, SceneError> {
             let [min, max] = species.stance.bounds;
             let texels = (max - min).max_element() / texel;
-            let most = (4.0 * texels * texels).clamp(*CANOPY.start(), *CANOPY.end());
+            let most = (4.0 * texels * texels).max(LEAST_CANOPY);
             Ok(Canopy::new(&species.points()?, &species.stance, most as u64))
         };
         let canopies: Vec<Canopy> = self.species.iter().map(canopy).collect::<Result<_, _>>()?;

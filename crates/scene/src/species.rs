@@ -75,25 +75,12 @@ pub struct CanopyPoint {
 const MOST_OPACITY: f64 = 0.98;
 
 impl Canopy {
+    /// No canopy has more points.
+    pub const MOST: u64 = 256;
+
     /// At most `most` points of a block, the finest such cut.
     pub fn new(block: &PointsBlock, stance: &Stance, most: u64) -> Self {
-        let size = block.half_diagonal() * 2.0;
-        let projection = Projection::Orthographic { height: size };
-        // Seen from anywhere: without perspective all cells are cut alike.
-        let eye = block.middle() + DVec3::Z * size;
-        let camera = Camera::new(eye, -DVec3::Z, projection, [1024, 1024]);
-        let coarsest = Thresholds {
-            finest: PixelArea(f64::INFINITY),
-            largest: PixelArea(f64::INFINITY),
-            depth_bias: PixelArea(0.0),
-        };
-        // Cuts without triangles.
-        let chosen = within_budget(block, &camera, f64::INFINITY, most);
-        let thresholds = match chosen {
-            Some((t, _)) if t != Thresholds::TRIANGLES => t,
-            Some(_) => Thresholds { finest: PixelArea(0.0), ..coarsest },
-            None => coarsest,
-        };
+        let (camera, thresholds) = cut(block, most.min(Self::MOST));
         let cut = select(block, &camera, &thresholds);
         let points = cut.points(block).map(|(_, cell, p)| {
             let place = block.to_world(block.position(cell, p.position));
@@ -111,6 +98,14 @@ impl Canopy {
         Self { points: points.collect() }
     }
 
+    /// Area of the smallest points that any canopy of a block has, in square world units of the pack: what
+    /// light asks of it.
+    pub fn finest_area(block: &PointsBlock) -> f64 {
+        let (camera, thresholds) = cut(block, Self::MOST);
+        let pixels = camera.pixels_per_unit(1.0);
+        thresholds.finest.0 / (pixels * pixels)
+    }
+
     /// Optical depth that a leaf has before it on the mean within its own point: light falls on a layer
     /// of depth t by the mean of e^−x for x from 0 to t. What a map of larger texels cannot show.
     pub fn clump(&self) -> f64 {
@@ -120,6 +115,26 @@ impl Canopy {
         let lit: f64 = self.points.iter().map(|p| weight(p) * part(p.depth.into())).sum();
         if all > 0.0 { -(lit / all).ln() } else { 0.0 }
     }
+}
+
+/// The finest cut of at most so many points, without triangles.
+fn cut(block: &PointsBlock, most: u64) -> (Camera, Thresholds) {
+    let size = block.half_diagonal() * 2.0;
+    let projection = Projection::Orthographic { height: size };
+    // Seen from anywhere: without perspective all cells are cut alike.
+    let eye = block.middle() + DVec3::Z * size;
+    let camera = Camera::new(eye, -DVec3::Z, projection, [1024, 1024]);
+    let coarsest = Thresholds {
+        finest: PixelArea(f64::INFINITY),
+        largest: PixelArea(f64::INFINITY),
+        depth_bias: PixelArea(0.0),
+    };
+    let thresholds = match within_budget(block, &camera, f64::INFINITY, most) {
+        Some((t, _)) if t != Thresholds::TRIANGLES => t,
+        Some(_) => Thresholds { finest: PixelArea(0.0), ..coarsest },
+        None => coarsest,
+    };
+    (camera, thresholds)
 }
 
 /// A species as it is opened.

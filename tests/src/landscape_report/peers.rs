@@ -40,9 +40,6 @@ const TRIANGLE_BUDGET: u64 = 60_000_000;
 /// otherwise.
 const TRIANGLE_PIXELS: f64 = 4.0;
 
-/// Points that a clump is taken from: as many as ours.
-const CANOPY_POINTS: u64 = 256;
-
 /// Pixels that the ground may be off: ours.
 const GROUND: f64 = 0.5;
 
@@ -135,7 +132,7 @@ pub(crate) struct PeerModel {
 /// Share of all light that the clump around a leaf lets through, of each species: ours.
 fn clumps(scene: &Scene) -> Result<Vec<f32>> {
     let of = |s: &Species| -> Result<f32> {
-        let canopy = Canopy::new(&s.points()?, &s.stance, CANOPY_POINTS);
+        let canopy = Canopy::new(&s.points()?, &s.stance, Canopy::MOST);
         Ok((-canopy.clump()).exp() as f32)
     };
     scene.species.iter().map(of).collect()

@@ -11,11 +11,10 @@ use crate::sheet::{Place, Sheet};
 use crate::textures::array_view;
 use crate::views::{FrameRecord, frame_records, page_format, page_texels};
 use bytemuck::{Pod, Zeroable};
-use forest_scene::Stance;
-use forest_views::{Channel, Directions, Dome, Quality, TileRecord, ViewsBlock};
+use forest_scene::{Impostor, Stance};
+use forest_views::{Channel, Directions, Quality, TileRecord, ViewsBlock};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
-use std::ops::Range;
 use wgpu::{BindGroup, BindingResource, Buffer, BufferUsages, Texture};
 
 /// Steps of a compass around, and from the nadir to the zenith.
@@ -30,12 +29,6 @@ pub(crate) const BOARDS_HEAD: usize = 4 + BUCKETS as usize;
 
 /// Impostors that a workgroup sorts.
 pub(crate) const SORTED_AT_ONCE: u32 = 256;
-
-/// The smallest tiles that are drawn: a tree is no smaller.
-const LEAST_TEXELS: u32 = crate::landscape::LEAST_IMPOSTOR as u32;
-
-/// Levels are needed of up to so many times the pixels at which views differ by one.
-const FINER: f64 = 3.0;
 
 /// What `Species` of tree.wgsl has of its views.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,25 +60,26 @@ pub(crate) struct ViewTables {
     frames: Vec<FrameRecord>,
     compass: Vec<[u32; 2]>,
     tiles: u32,
+    /// Of each species that has views.
+    rules: Vec<Impostor>,
 }
 
 impl ViewTables {
     /// Adds the views of a species.
     pub(crate) fn add(&mut self, views: &ViewsBlock, stance: &Stance) -> ViewsRecord {
         let header = &views.header;
-        let drawn = levels(views);
-        let finest = header.levels[drawn.start].texels;
+        let rule = Impostor::new(views, stance);
         let record = ViewsRecord {
-            center: ((views.center() - stance.anchor) * stance.unit).as_vec3().to_array(),
-            side: (2.0 * header.half * stance.unit) as f32,
-            texels: finest as f32,
-            most: most_pixels(views).min(finest.into()) as f32,
-            levels: drawn.len() as u32,
+            center: rule.center.as_vec3().to_array(),
+            side: rule.side as f32,
+            texels: rule.texels as f32,
+            most: rule.most_pixels(rule.texels) as f32,
+            levels: rule.levels.len() as u32,
             first_level: self.levels.len() as u32,
             first_frame: self.frames.len() as u32,
             first_compass: self.compass.len() as u32,
         };
-        for level in drawn {
+        for level in rule.levels.clone() {
             self.levels.push(LevelRecord {
                 first_tile: self.tiles,
                 flags: u32::from(header.channels.normal) | u32::from(header.channels.depth) << 1,
@@ -96,26 +90,9 @@ impl ViewTables {
         }
         self.frames.extend(frame_records(views));
         self.compass.extend(compass(views.directions()));
+        self.rules.push(rule);
         record
     }
-}
-
-/// How many pixels large a tile may be for its tree to be off by no more than a pixel: what lies a
-/// quarter of the tile before its middle moves by so much between a direction and the nearest view.
-fn most_pixels(views: &ViewsBlock) -> f64 {
-    let directions = views.directions();
-    let all = if directions.dome == Dome::Upper { TAU } else { 2.0 * TAU };
-    let step = (all / f64::from(directions.count())).sqrt();
-    1.0 / (0.25 * 0.5 * step)
-}
-
-/// The levels that are drawn: none much finer than views differ, none smaller than an impostor.
-fn levels(views: &ViewsBlock) -> Range<usize> {
-    let all = &views.header.levels;
-    let most = FINER * most_pixels(views);
-    let first = all.iter().position(|l| f64::from(l.texels) <= most).unwrap_or(all.len() - 1);
-    let end = all.iter().position(|l| l.texels < LEAST_TEXELS).unwrap_or(all.len());
-    first..end.max(first + 1)
 }
 
 /// By direction to the eye, three views of 16 bits and the shares of the first two of 8.
@@ -162,7 +139,7 @@ impl Impostors {
         let boards = gpu.buffer("impostors", BOARDS_HEAD as u64 * 4 + room * 8, storage)?;
         let sorted = gpu.buffer("sorted impostors", room * 4, storage)?;
         let draw = gpu.buffer("draw of impostors", 16, storage | BufferUsages::INDIRECT)?;
-        let pages = Pages::load(gpu, views)?;
+        let pages = Pages::load(gpu, views, &tables.rules)?;
         let tiles = gpu.storage("tiles", &[bytemuck::cast_slice(&pages.tiles)])?;
         let levels = gpu.storage("levels", &[bytemuck::cast_slice(&tables.levels)])?;
         let frames = gpu.storage("frames", &[bytemuck::cast_slice(&tables.frames)])?;
@@ -209,10 +186,13 @@ struct Pages {
 }
 
 impl Pages {
-    fn load(gpu: &Gpu, all: &[&ViewsBlock]) -> Result<Self, GpuError> {
+    fn load(gpu: &Gpu, all: &[&ViewsBlock], rules: &[Impostor]) -> Result<Self, GpuError> {
         let is_block = |v: &&ViewsBlock| v.header.quality == Quality::Block;
         let compressed = gpu.takes_blocks() && all.iter().all(is_block);
-        let drawn = || all.iter().flat_map(|v| levels(v).map(move |l| (*v, l)));
+        let drawn = || {
+            let both = all.iter().zip(rules);
+            both.flat_map(|(views, rule)| rule.levels.clone().map(move |level| (*views, level)))
+        };
         let sizes: Vec<[u32; 2]> = drawn()
             .flat_map(|(v, l)| {
                 let level = &v.header.levels[l];
@@ -272,6 +252,7 @@ fn texture_bytes(texture: &Texture) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use forest_views::Dome;
 
     #[test]
     fn a_compass_points_at_the_views_around() {

@@ -34,13 +34,6 @@ pub(crate) const LEAST_SHARE: f64 = 1.0 / 16.0;
 /// Places on the way to the eye that are asked for trees.
 pub(crate) const VIEW_STEPS: u32 = 10;
 
-/// Pixels along the side of the smallest impostor; smaller trees are a few points.
-pub(crate) const LEAST_IMPOSTOR: f64 = 4.0;
-
-/// Impostors are all there is of a tree up to so much of the size at which they are as fine as points;
-/// from there on points take over.
-pub(crate) const IMPOSTOR_FADE: f64 = 0.8;
-
 /// Levels of the pyramid, and the probes.
 pub(crate) const MOST_NEARNESS: usize = 8;
 

@@ -1,11 +1,11 @@
 //! What shaders know of the species: one table of each thing for all of them.
 
 use crate::error::GpuError;
+use crate::landscape::LandscapeDetail;
 use crate::landscape::impostors::ViewTables;
-use crate::landscape::{IMPOSTOR_FADE, LandscapeDetail};
 use bytemuck::{Pod, Zeroable};
 use forest_points::{CellRecord, Order, PointsBlock, SizeCode};
-use forest_scene::{Canopy, Species, Stance};
+use forest_scene::{Canopy, IMPOSTOR_FADE, Species, Stance};
 use forest_soup::Camera;
 use forest_views::ViewsBlock;
 use glam::DVec3;
@@ -88,9 +88,6 @@ pub(crate) struct Tables {
 /// Size codes there are, [`SizeCode::INFINITE`] among them.
 const CODES: u32 = 4096;
 
-/// Points that the optical depth of a tree is taken from.
-const CANOPY_POINTS: u64 = 256;
-
 /// Steps of an instance's scale.
 const SCALE_STEPS: f64 = 4095.0;
 
@@ -129,7 +126,7 @@ impl Tables {
                 .map(|fine| top.partition_point(|p| u32::from(p.parent().bits()) > fine) as u32),
         );
         self.triangle_sizes.extend(block.triangles.iter().map(|t| u32::from(t.size)));
-        let canopy = Canopy::new(block, stance, CANOPY_POINTS);
+        let canopy = Canopy::new(block, stance, Canopy::MOST);
         let views = views.map_or_else(Default::default, |v| self.views.add(v, stance));
         let below = block.cells.iter().filter(|c| !c.is_top());
         self.species.push(SpeciesRecord {

@@ -81,11 +81,12 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let views = vec3u(found.x & 0xffffu, found.x >> 16u, found.y & 0xffffu);
     let first = f32((found.y >> 16u) & 0xffu) / 255.0;
     out.shares = vec2f(first, first + f32(found.y >> 24u) / 255.0);
-    // The quad holds what the three show at the finest level.
-    let finest = levels[s.first_level];
-    let a = shown(finest.first_tile + views.x, finest.texels);
-    let b = shown(finest.first_tile + views.y, finest.texels);
-    let c = shown(finest.first_tile + views.z, finest.texels);
+    let board = board_of(t, s);
+    let level = levels[s.first_level + board.level];
+    // The quad holds what the three show.
+    let a = shown(level.first_tile + views.x, level.texels);
+    let b = shown(level.first_tile + views.y, level.texels);
+    let c = shown(level.first_tile + views.z, level.texels);
     let low = min(min(a.xy, b.xy), c.xy);
     let high = max(max(a.zw, b.zw), c.zw);
     let corner = mix(low, high, vec2f(f32(index & 1u), f32(index >> 1u)));
@@ -97,8 +98,6 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let height = clamp(-corner.y * half / max(out.up.y, 0.1), -tall, tall);
     let depth = dot(center, frame.forward) + height * frame.forward.y;
     out.position = flat_clip(at.xy, depth_value(depth));
-    let board = board_of(t, s);
-    let level = levels[s.first_level + board.level];
     let local = turned(back, center);
     let ray = turned(back, out.place);
     let frames = s.first_frame + views;
