@@ -53,6 +53,9 @@ pub(crate) struct Args {
     force: bool,
 }
 
+/// What landscapes draw of views.
+const LANDSCAPE_CHANNELS: Channels = Channels { depth: true, ..Channels::COLOR };
+
 /// What became of a pack.
 #[derive(Serialize)]
 struct Row {
@@ -110,13 +113,7 @@ fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Vec<Row>> 
     for (i, (species, need)) in scene.species.iter().zip(&needs).enumerate() {
         let stem = species.pack.path().file_name().context("a pack without a name")?;
         let name = format!("{i}-{}", stem.to_string_lossy());
-        rows.push(write(
-            args,
-            &species.pack,
-            &name,
-            need,
-            Channels { sky: false, ..Channels::ALL },
-        )?);
+        rows.push(write(args, &species.pack, &name, need, LANDSCAPE_CHANNELS)?);
         file.species[i].pack = PathBuf::from(name);
         // As the whole pack has it: its box stays, but be sure.
         file.species[i].anchor = Some(species.stance.anchor.to_array());

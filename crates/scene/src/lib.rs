@@ -54,7 +54,7 @@ pub use land::{Land, MOST_POINTS};
 pub use need::{Fineness, SpeciesNeed, needs};
 pub use scatter::{MOST_TREES, Scatter};
 pub use scene::{Scene, open_land, plant, read_file, write_file};
-pub use shade::{Casters, DEPTH_STEPS, DIFFUSE, LOWEST_LIGHT, OpacityMap, Texel};
+pub use shade::{Casters, DEPTH_STEPS, DIFFUSE, LOWEST_LIGHT, OpacityMap, Texel, foliage};
 pub use sight::{Sight, Sky};
 pub use species::{Canopy, CanopyPoint, Species, Stance};
 pub use surface::{GroundVertex, ground_soup, ground_vertices};

@@ -48,7 +48,7 @@ pub(crate) struct ViewsRecord {
 #[repr(C)]
 struct LevelRecord {
     first_tile: u32,
-    flags: u32,
+    has_depth: u32,
     texels: f32,
     reach: f32,
 }
@@ -82,7 +82,7 @@ impl ViewTables {
         for level in rule.levels.clone() {
             self.levels.push(LevelRecord {
                 first_tile: self.tiles,
-                flags: u32::from(header.channels.normal) | u32::from(header.channels.depth) << 1,
+                has_depth: header.channels.depth.into(),
                 texels: header.levels[level].texels as f32,
                 reach: (header.radius / header.half) as f32,
             });
@@ -179,9 +179,9 @@ impl Impostors {
     }
 }
 
-/// Colours, normals and depths of all levels, and where tiles lie in them.
+/// Colours and depths of all levels, and where tiles lie in them.
 struct Pages {
-    textures: [Texture; 3],
+    textures: [Texture; 2],
     tiles: Vec<TileRecord>,
 }
 
@@ -203,7 +203,6 @@ impl Pages {
         let texture = |what, channel| sheet.texture(gpu, what, page_format(channel, compressed));
         let textures = [
             texture("colours of views", Channel::Color)?,
-            texture("normals of views", Channel::Normal)?,
             texture("depths of views", Channel::Depth)?,
         ];
         let mut tiles = Vec::new();
@@ -213,7 +212,7 @@ impl Pages {
             let places = &sheet.places[first..first + count];
             first += count;
             tiles.extend(views.tiles[level].iter().map(|tile| moved(tile, places)));
-            let channels = [Channel::Color, Channel::Normal, Channel::Depth];
+            let channels = [Channel::Color, Channel::Depth];
             for (texture, channel) in textures.iter().zip(channels) {
                 let texels = page_texels(views, channel, level, compressed)?;
                 if !texels.is_empty() {

@@ -68,7 +68,7 @@ impl Layouts {
             large: layout("large points", drawn, &[r, r, r, r]),
             triangles: layout("triangles of trees", drawn, &[r, r, r, r, r, pages, r]),
             sort: layout("sort", compute, &[w, w, w]),
-            impostors: layout("impostors", drawn, &[r, r, r, r, r, r, r, pages, pages, pages]),
+            impostors: layout("impostors", drawn, &[r, r, r, r, r, r, r, pages, pages]),
         }
     }
 }

@@ -3,8 +3,8 @@
 
 struct Level {
     first_tile: u32,
-    // 1: normals, 2: depth are there.
-    flags: u32,
+    // 1 if depth is there.
+    has_depth: u32,
     // Along the side of a tile.
     texels: f32,
     // Radius of the ball that holds the tree, in units of half a tile.
@@ -21,29 +21,32 @@ struct Level {
 // By direction, three views of 16 bits and the shares of the first two of 8.
 @group(1) @binding(6) var<storage, read> compass: array<vec2u>;
 @group(1) @binding(7) var color_pages: texture_2d_array<f32>;
-@group(1) @binding(8) var normal_pages: texture_2d_array<f32>;
-@group(1) @binding(9) var depth_pages: texture_2d_array<f32>;
+@group(1) @binding(8) var depth_pages: texture_2d_array<f32>;
 
 struct Corner {
     @builtin(position) position: vec4f,
-    // Texel of the whole tile of each view; the views' tiles.
+    // Texel of the whole tile of each view; the views' tiles, and the shares of one and of two of them.
     @location(0) at: vec4f,
     @location(1) at_last: vec2f,
-    // Place of the tree's middle plane from the eye, and what a height of 1 adds.
-    @location(2) place: vec3f,
-    @location(9) @interpolate(flat) rise: vec3f,
-    // Axes of the view that would be seen from the eye.
-    @location(10) @interpolate(flat) right: vec3f,
-    @location(11) @interpolate(flat) up: vec3f,
-    @location(12) @interpolate(flat) toward: vec3f,
-    @location(3) @interpolate(flat) views: vec3u,
-    @location(4) @interpolate(flat) shares: vec2f,
-    // Of its level.
-    @location(5) @interpolate(flat) flags: u32,
-    // Of the hash rule; share of the samples; what is left of light within a clump.
-    @location(6) @interpolate(flat) mask: u32,
-    @location(7) @interpolate(flat) share: f32,
-    @location(8) @interpolate(flat) clump: f32,
+    @location(2) @interpolate(flat) views: vec3u,
+    @location(3) @interpolate(flat) shares: vec2f,
+    // Place of the tree's middle plane from the eye, and what a height of 1 adds; 0 without depth.
+    @location(4) place: vec3f,
+    @location(5) @interpolate(flat) rise: vec3f,
+    // Light of the sun and of the sky where all of both is seen.
+    @location(6) @interpolate(flat) sun: vec3f,
+    @location(7) @interpolate(flat) sky: vec3f,
+    // Of the hash rule; share of the samples.
+    @location(8) @interpolate(flat) mask: u32,
+    @location(9) @interpolate(flat) share: f32,
+}
+
+// forest_scene::foliage
+fn foliage(cosine: f32, translucency: f32) -> f32 {
+    let c = clamp(cosine, -1.0, 1.0);
+    let angle = acos(c);
+    let s = sqrt(1.0 - c * c);
+    return 2.0 / (3.0 * HALF_TURN) * (s + (HALF_TURN - angle) * c + translucency * (s - angle * c));
 }
 
 // Where a ray from the eye through `direction` meets a view's tile.
@@ -68,9 +71,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let center = place_of(t, s.view_center);
     let toward = -normalize(center);
     var out: Corner;
-    out.toward = toward;
-    out.right = normalize(vec3f(toward.z, 0.0, -toward.x));
-    out.up = cross(toward, out.right);
+    let right = normalize(vec3f(toward.z, 0.0, -toward.x));
+    let up = cross(toward, right);
     // In the tree's own frame.
     let back = vec2f(t.turn.x, -t.turn.y);
     let from_tree = turned(back, toward);
@@ -91,11 +93,11 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let high = max(max(a.zw, b.zw), c.zw);
     let corner = mix(low, high, vec2f(f32(index & 1u), f32(index >> 1u)));
     let half = 0.5 * s.view_side * t.scale;
-    out.place = center + (out.right * corner.x - out.up * corner.y) * half;
+    out.place = center + (right * corner.x - up * corner.y) * half;
     let at = project(out.place);
     // It stands about the tree's axis.
     let tall = s.tall * t.scale;
-    let height = clamp(-corner.y * half / max(out.up.y, 0.1), -tall, tall);
+    let height = clamp(-corner.y * half / max(up.y, 0.1), -tall, tall);
     let depth = dot(center, frame.forward) + height * frame.forward.y;
     out.position = flat_clip(at.xy, depth_value(depth));
     let local = turned(back, center);
@@ -107,11 +109,13 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     );
     out.at_last = level.texels * tile_at(view_frames[frames.z], local, ray, half);
     out.views = views + level.first_tile;
-    out.flags = level.flags;
-    out.rise = toward * (half * level.reach);
+    out.rise = toward * select(0.0, half * level.reach, level.has_depth != 0u);
     out.mask = t.mask;
     out.share = board.share;
-    out.clump = exp(-s.clump);
+    let left = exp(-s.clump);
+    out.sun = frame.sun * (foliage(dot(toward, frame.to_sun), frame.translucency) * left);
+    // The mean of normals turned to the eye, by their projected area, is two thirds long.
+    out.sky = frame.sky * (skyward(toward * (2.0 / 3.0)) * left);
     return out;
 }
 
@@ -139,17 +143,10 @@ fn fragment(in: Corner) -> @location(0) vec4f {
     if !covers(COVER ^ in.mask, sample, u32(color.a * 255.0 + 0.5)) {
         discard;
     }
-    // Views differ from what the eye sees by a few degrees: their heights and normals are taken for those
-    // towards the eye.
-    var normal = in.toward;
-    if (in.flags & 1u) != 0u {
-        let n = textureLoad(normal_pages, p.xy, p.z, 0).xy * 2.0 - 1.0;
-        normal = in.right * n.x + in.up * n.y + in.toward * sqrt(max(1.0 - dot(n, n), 0.0));
+    if frame.lit == 0u {
+        return vec4f(color.rgb, 1.0);
     }
-    var height = 0.0;
-    if (in.flags & 2u) != 0u {
-        height = 1.0 - 2.0 * textureLoad(depth_pages, p.xy, p.z, 0).x;
-    }
-    let seen = seen_at(in.place + in.rise * height) * in.clump;
-    return vec4f(color.rgb * light(normal, seen.x, seen.y * skyward(normal)), 1.0);
+    let height = 1.0 - 2.0 * textureLoad(depth_pages, p.xy, p.z, 0).x;
+    let seen = seen_at(in.place + in.rise * height);
+    return vec4f(color.rgb * (in.sun * seen.x + in.sky * seen.y), 1.0);
 }
