@@ -82,6 +82,8 @@ demo: gpu
 	@for what in points views volume; do \
 	  target/release/forest-view $(OUT)/conifer.fpack --headless -o $(OUT)/view-$$what.png --as $$what \
 	    --view 25,12 --size 720x720 || exit 1; done
+	@for tree in broadleaf_young.gltf shrub.obj; do \
+	  target/release/forest-bake views sample-data/$$tree -o $(OUT)/$${tree%.*}.fpack --texels 128 -q || exit 1; done
 	@target/release/forest-bake scene $(OUT)/conifer.fpack:height=16,weight=2 $(OUT)/broadleaf_young.fpack:height=12,weight=2 \
 	  $(OUT)/shrub.fpack:height=4 -o $(OUT)/forest.toml --trees 20000 --force
 	@target/release/forest-view $(OUT)/forest.toml --headless -o $(OUT)/forest.png --samples 2

@@ -268,6 +268,22 @@ fn alone(scene: &Scene, distance: f64, down: f64) -> Camera {
 }
 
 #[test]
+fn a_tree_about_the_eye_is_not_drawn_by_views() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let mut scene = Scene::open(&make_of(packs_with_views(), dir.path(), 100, &[])).unwrap();
+    scene.trees.retain(|t| t.species() == 1);
+    scene.trees.truncate(1);
+    let counts = |distance: f64| {
+        // In a picture of a few pixels even the nearest tree is small.
+        let camera = Camera { width: 16, height: 16, ..alone(&scene, distance, 0.2) };
+        draw(&gpu, &scene, &camera, &LandscapeDetail::default(), false, 1).counts
+    };
+    let (near, far) = (counts(3.0), counts(60.0));
+    assert!(near.impostors == 0 && near.points + near.triangles > 0, "{near:?}");
+    assert_eq!((far.impostors, far.points), (1, 0));
+}
+
+#[test]
 fn trunks_before_their_own_crowns_column_are_not_left_out() {
     let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
     let scene = Scene::open(&make(dir.path(), 4000, &[])).unwrap();
@@ -468,6 +484,55 @@ fn pruned_views_draw_the_same_frames_within_the_need() {
 }
 
 #[test]
+fn more_bytes_are_spent_on_what_is_seen_and_are_worth_it() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let measured: Vec<PathBuf> = packs_with_views()
+        .iter()
+        .zip(TREES)
+        .map(|(from, tree)| {
+            let pack = dir.path().join(from.file_name().unwrap());
+            std::fs::copy(from, &pack).unwrap();
+            let source = arg(&repo("sample-data").join(tree));
+            let few =
+                ["--alone", "--embed", "--heights", "64,16,4", "--views", "3", "--samples", "2"];
+            succeed(&[&["eval", &arg(&pack), "--source", &source, "-q"][..], &few].concat());
+            pack
+        })
+        .collect();
+    let path = make_of(&measured, dir.path(), 1000, &[]);
+    let whole = Scene::open(&path).unwrap();
+    let camera = whole.file.camera(None).unwrap().camera(&whole.land, [320, 180]);
+    let detail = LandscapeDetail { finest: PixelArea(1.0), ..LandscapeDetail::default() };
+    let full = draw(&gpu, &whole, &camera, &detail, false, 2).pixels;
+    let scene = arg(&path);
+    let line = ["needs", &scene, "--height", "180", "--finest", "1", "--json"];
+    let mut last = (f64::INFINITY, f64::INFINITY);
+    for bytes in ["300KiB", "900KiB", "3MiB"] {
+        let folder = dir.path().join(bytes);
+        let text = succeed(&[&line[..], &["-o", &arg(&folder), "--max-bytes", bytes]].concat());
+        let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let (all, expected) = (&report["packs"], report["budget"]["error"].as_f64().unwrap());
+        let sizes = all.as_array().unwrap().iter().map(|p| p["bytes"][1].as_u64().unwrap());
+        let most = bytes.parse::<bytesize::ByteSize>().unwrap().0;
+        let sum: u64 = sizes.sum();
+        assert!(sum <= most && sum * 4 > most * 3, "{sum} of {most} bytes");
+        let lean = Scene::open(&folder.join("forest.toml")).unwrap();
+        let pixels = draw(&gpu, &lean, &camera, &detail, false, 2).pixels;
+        let off = |(a, b): (&[f32; 3], &[f32; 3])| f64::from((a[1] - b[1]).powi(2));
+        let error = full.iter().zip(&pixels).map(off).sum::<f64>().sqrt();
+        eprintln!("{bytes}: {sum} {expected} {error}");
+        assert!(expected < last.0 && error < last.1, "{bytes}: {expected}, {error} after {last:?}");
+        last = (expected, error);
+    }
+    let (out, tiny) = (arg(&dir.path().join("none")), ["--max-bytes", "1KiB"]);
+    let none = run(&[&line[..], &["-o", &out], &tiny].concat());
+    assert!(none.0 == 1 && none.2.contains("the smallest packs have"), "{none:?}");
+    let text = succeed(&[&line[..], &["-o", &out, "--max-error", "0.2"]].concat());
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(report["budget"]["error"].as_f64().unwrap() <= 0.2);
+}
+
+#[test]
 fn a_pruned_pack_is_drawn_as_the_whole_one_from_its_nearest_distance_on() {
     let dir = tempfile::tempdir().unwrap();
     let folder = arg(&dir.path().join("lean"));
@@ -477,7 +542,7 @@ fn a_pruned_pack_is_drawn_as_the_whole_one_from_its_nearest_distance_on() {
     let line = ["needs", &pack, "-o", &folder, "--nearest", "11m", "--height", "64", "--fov", "35"];
     let text = succeed(&[&line[..], &["--json"]].concat());
     let rows: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let bytes = rows[0]["bytes"].as_array().unwrap();
+    let bytes = rows["packs"][0]["bytes"].as_array().unwrap();
     assert!(bytes[1].as_u64().unwrap() * 2 < bytes[0].as_u64().unwrap(), "{rows}");
     let lean = arg(&dir.path().join("lean").join(name));
     succeed(&["verify", &lean, "-q"]);

@@ -2,10 +2,13 @@
 
 use crate::failure::Usage;
 use crate::output;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use bytesize::ByteSize;
 use forest_pack::{Pack, PackWriter, kind};
 use forest_points::{PixelArea, PointsBlock, PointsNeed, PruneReport, Thresholds, prune};
-use forest_scene::{Fineness, Scene, SpeciesNeed, needs, write_file};
+use forest_scene::{
+    Fineness, Scene, SpeciesNeed, needs, solve, within_bytes, within_error, write_file,
+};
 use forest_soup::{Camera, Projection};
 use forest_views::{Channels, Lookup, ViewsBlock};
 use glam::DVec3;
@@ -42,6 +45,13 @@ pub(crate) struct Args {
     /// 0 for points alone, which leaves the views out.
     #[arg(long, default_value_t = 1.0, value_name = "TIMES")]
     impostors: f64,
+    /// Scenes: most bytes of all packs together: what is needed most is kept, by what trees fill of the
+    /// pictures and the packs' measured tables (eval --embed).
+    #[arg(long, value_name = "BYTES", conflicts_with = "max_error")]
+    max_bytes: Option<ByteSize>,
+    /// Scenes: the smallest packs whose pictures are expected to be off by no more: mean FLIP, trees alone.
+    #[arg(long, value_name = "ERROR")]
+    max_error: Option<f64>,
     /// Packs: largest size of a view's texel in pixels that is asked for.
     #[arg(long, default_value_t = 1.0, value_name = "PX")]
     texel: f64,
@@ -55,6 +65,14 @@ pub(crate) struct Args {
 
 /// What landscapes draw of views.
 const LANDSCAPE_CHANNELS: Channels = Channels { depth: true, ..Channels::COLOR };
+
+/// What became of all packs.
+#[derive(Serialize)]
+struct Report {
+    packs: Vec<Row>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    budget: Option<Budget>,
+}
 
 /// What became of a pack.
 #[derive(Serialize)]
@@ -70,15 +88,15 @@ struct Row {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let thresholds = thresholds(args)?;
     std::fs::create_dir_all(&args.output).with_context(|| args.output.display().to_string())?;
-    let rows = match &args.inputs[..] {
+    let report = match &args.inputs[..] {
         [scene] if scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) => {
             of_scene(args, scene, thresholds)?
         }
         packs => of_packs(args, packs, thresholds)?,
     };
     let text = match args.json {
-        true => format!("{}\n", serde_json::to_string_pretty(&rows)?),
-        false => table(&rows)?,
+        true => format!("{}\n", serde_json::to_string_pretty(&report)?),
+        false => table(&report)?,
     };
     Ok(output::print(&text)?)
 }
@@ -98,11 +116,17 @@ fn thresholds(args: &Args) -> Result<[f64; 2]> {
 
 /// Prunes all packs of a scene, and writes the scene anew. Landscapes are drawn of points, triangles and
 /// views: volumes are left out.
-fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Vec<Row>> {
+fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Report> {
     let scene = Scene::open(path)?;
     let [finest, largest] = thresholds.map(PixelArea);
     let drawn = Fineness { height: args.height, finest, largest, impostors: args.impostors };
-    let needs = needs(&scene, &drawn)?;
+    let (needs, budget) = match (args.max_bytes.map(|b| b.0), args.max_error) {
+        (None, None) => (needs(&scene, &drawn)?, None),
+        limits => {
+            let (needs, budget) = within(&scene, &drawn, limits)?;
+            (needs, Some(budget))
+        }
+    };
     let folder = path.parent().unwrap_or(Path::new("."));
     let whole = |p: &PathBuf| std::path::absolute(folder.join(p)).unwrap_or_else(|_| p.clone());
     let mut file = scene.file.clone();
@@ -120,10 +144,51 @@ fn of_scene(args: &Args, path: &Path, thresholds: [f64; 2]) -> Result<Vec<Row>> 
     }
     let name = path.file_name().context("a scene without a name")?;
     write_file(&args.output.join(name), &file)?;
-    Ok(rows)
+    let bytes = rows.iter().map(|r| r.bytes[1]).sum::<u64>();
+    match args.max_bytes {
+        Some(most) if bytes > most.0 => {
+            bail!("{}: {bytes} bytes; asked for {most}", name.display())
+        }
+        _ => Ok(Report { packs: rows, budget }),
+    }
 }
 
-fn of_packs(args: &Args, packs: &[PathBuf], [finest, largest]: [f64; 2]) -> Result<Vec<Row>> {
+/// What was chosen for a budget.
+#[derive(Serialize)]
+struct Budget {
+    /// Expected mean FLIP of the pictures, what trees fill of them.
+    error: f64,
+    /// Bytes and expected errors of the best choices, the smallest first.
+    front: Vec<(u64, f64)>,
+}
+
+/// The needs of the best packs within a number of bytes, or an error.
+fn within(
+    scene: &Scene,
+    drawn: &Fineness,
+    limits: (Option<u64>, Option<f64>),
+) -> Result<(Vec<SpeciesNeed>, Budget)> {
+    let solved = solve(scene, drawn)?;
+    let (first, last) = (&solved.front[0], &solved.front[solved.front.len() - 1]);
+    let chosen = match limits {
+        (Some(bytes), _) => within_bytes(&solved.front, bytes).ok_or_else(|| {
+            Usage(format!("--max-bytes {bytes}: the smallest packs have {} bytes", first.bytes))
+        })?,
+        (_, most) => {
+            let most = most.unwrap_or_default();
+            within_error(&solved.front, most).ok_or_else(|| {
+                Usage(format!("--max-error {most}: the finest packs have {:.5}", last.error))
+            })?
+        }
+    };
+    let front = solved.front.iter().map(|c| (c.bytes, c.error)).collect();
+    Ok((solved.needs(chosen), Budget { error: chosen.error, front }))
+}
+
+fn of_packs(args: &Args, packs: &[PathBuf], [finest, largest]: [f64; 2]) -> Result<Report> {
+    if args.max_bytes.is_some() || args.max_error.is_some() {
+        return Err(Usage("--max-bytes and --max-error are for scenes".into()).into());
+    }
     let nearest = args.nearest.ok_or_else(|| Usage("packs need --nearest".into()))?;
     let tall = 2.0 * (args.fov.to_radians() * 0.5).tan() * nearest;
     let pixels = f64::from(args.height) / tall;
@@ -138,7 +203,8 @@ fn of_packs(args: &Args, packs: &[PathBuf], [finest, largest]: [f64; 2]) -> Resu
         };
         write(args, &pack, &name, &SpeciesNeed { points, views }, Channels::ALL)
     };
-    packs.iter().map(one).collect()
+    let packs = packs.iter().map(one).collect::<Result<_>>()?;
+    Ok(Report { packs, budget: None })
 }
 
 /// The levels of views that a camera draws whose eye is so far from the tree's box, or farther.
@@ -190,9 +256,9 @@ fn write(
     Ok(Row { pack: target.display().to_string(), bytes, kept, view_levels })
 }
 
-fn table(rows: &[Row]) -> Result<String, std::fmt::Error> {
+fn table(report: &Report) -> Result<String, std::fmt::Error> {
     let mut text = String::new();
-    for r in rows {
+    for r in &report.packs {
         let part =
             |[all, kept]: [u64; 2]| format!("{} of {}", output::count(kept), output::count(all));
         let [before, after] = r.bytes;
@@ -210,8 +276,25 @@ fn table(rows: &[Row]) -> Result<String, std::fmt::Error> {
             part(r.kept.triangles)
         )?;
     }
+    if let Some(budget) = &report.budget {
+        writeln!(
+            text,
+            "expected error {:.5} (mean FLIP of the pictures; trees alone)",
+            budget.error
+        )?;
+        writeln!(text, "      bytes   error")?;
+        let last = budget.front.len() - 1;
+        let rows = last.min(SHOWN - 1);
+        for k in 0..=rows {
+            let (bytes, error) = budget.front[k * last / rows.max(1)];
+            writeln!(text, "{:>11}  {error:.5}", output::bytes(bytes))?;
+        }
+    }
     Ok(text)
 }
+
+/// Rows of the table of errors by bytes.
+const SHOWN: usize = 12;
 
 /// "3", "3m", "4km".
 fn distance(text: &str) -> Result<f64, String> {

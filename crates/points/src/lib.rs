@@ -67,7 +67,7 @@ pub use calibration::Calibration;
 pub use header::{BakeCounts, CellRecord, PointsHeader};
 pub use materials::{read_materials, write_materials};
 pub use options::{BakeOptions, GridChoice, Order, RadiusRule, SurfelSize};
-pub use pruned::{PointsNeed, PruneReport, Pruned, prune};
+pub use pruned::{PointsNeed, PruneReport, Pruned, prune, pruned_bytes};
 pub use record::PointRecord;
 pub use select::{CellCut, Cut, PixelArea, Thresholds, select, select_into, within_budget};
 pub use size::SizeCode;

@@ -5,8 +5,11 @@
 //! so that what is drawn of a pruned pack is, sample by sample, what is drawn of the whole one.
 
 use crate::block::PointsBlock;
+use crate::header::CellRecord;
+use crate::record::PointRecord;
 use crate::select::{PixelArea, Thresholds};
 use crate::size::SizeCode;
+use crate::triangle::TriangleRecord;
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, header, kind};
 use forest_soup::{Camera, Projection};
 use serde::{Deserialize, Serialize};
@@ -125,15 +128,7 @@ pub fn prune(
     need: &PointsNeed,
     writer: &mut PackWriter,
 ) -> Result<PruneReport, PackError> {
-    let squared = block.scale() * block.scale();
-    // A code less: selection may round.
-    let limit = |area: f64| {
-        let code = SizeCode::at_most(area / squared).map_or(-1, |c| i32::from(c.bits()));
-        (code - 1).max(-1)
-    };
-    let [old_fine, old_coarse] = block.limits();
-    let fine = limit(need.finest).max(old_fine);
-    let coarse = limit(need.largest).max(fine).max(old_coarse);
+    let [fine, coarse] = limits(block, need);
     let mut cells = block.cells.to_vec();
     let (mut points, mut triangles, mut colors) = (Vec::new(), Vec::new(), Vec::new());
     let mut firsts = Vec::with_capacity(cells.len());
@@ -144,14 +139,7 @@ pub fn prune(
             cell.first_point.wrapping_add(block.point_offset(i)),
             cell.first_triangle.wrapping_add(block.triangle_offset(i)).wrapping_sub(whole),
         ]);
-        let all = block.cell_points(cell);
-        let kept = match cell.is_top() {
-            // Cells hang below its points.
-            true => all.len(),
-            false => all.partition_point(|p| i32::from(p.parent().bits()) > fine).max(1),
-        };
-        let drawn = block.cell_triangles(cell);
-        let drawn = drawn.partition_point(|t| i32::from(t.size) > coarse);
+        let [kept, drawn] = kept(block, cell, [fine, coarse]);
         cell.first_point = points.len() as u32;
         cell.points = kept as u32;
         cell.first_triangle = triangles.len() as u32;
@@ -195,6 +183,46 @@ pub fn prune(
         points: [block.points.len() as u64, points.len() as u64],
         triangles: [block.triangles.len() as u64, triangles.len() as u64],
     })
+}
+
+/// The size codes below which a need asks for no points and no triangles.
+fn limits(block: &PointsBlock, need: &PointsNeed) -> [i32; 2] {
+    let squared = block.scale() * block.scale();
+    // A code less: selection may round.
+    let limit = |area: f64| {
+        let code = SizeCode::at_most(area / squared).map_or(-1, |c| i32::from(c.bits()));
+        (code - 1).max(-1)
+    };
+    let [old_fine, old_coarse] = block.limits();
+    let fine = limit(need.finest).max(old_fine);
+    [fine, limit(need.largest).max(fine).max(old_coarse)]
+}
+
+/// How many points and triangles of a cell are kept: the first ones.
+fn kept(block: &PointsBlock, cell: &CellRecord, [fine, coarse]: [i32; 2]) -> [usize; 2] {
+    let all = block.cell_points(cell);
+    let kept = match cell.is_top() {
+        // Cells hang below its points.
+        true => all.len(),
+        false => all.partition_point(|p| i32::from(p.parent().bits()) > fine).max(1),
+    };
+    let drawn = block.cell_triangles(cell);
+    [kept, drawn.partition_point(|t| i32::from(t.size) > coarse)]
+}
+
+/// Bytes of the records that [`prune`] writes for a need: of points, and of triangles with their colours;
+/// without any triangles it writes no materials and textures either.
+pub fn pruned_bytes(block: &PointsBlock, need: &PointsNeed) -> [u64; 2] {
+    let limits = limits(block, need);
+    let [points, triangles] = block
+        .cells
+        .iter()
+        .map(|c| kept(block, c, limits))
+        .fold([0; 2], |[p, t], [more, triangles]| [p + more, t + triangles]);
+    let colors =
+        if block.triangle_colors.is_empty() { 0 } else { size_of_val(&block.triangle_colors[0]) };
+    let triangle = size_of::<TriangleRecord>() + colors;
+    [(points * size_of::<PointRecord>()) as u64, (triangles * triangle) as u64]
 }
 
 #[cfg(test)]

@@ -54,6 +54,12 @@ impl Impostor {
         }
     }
 
+    /// Whether a tree of this scale is drawn by points, however small it is in the picture: its tile may
+    /// hold an eye at this distance from its middle.
+    pub fn is_within(&self, scale: f64, distance: f64) -> bool {
+        distance < self.side * scale
+    }
+
     /// Pixels along the side of a tile up to which it may be off by no more than one, with texels no
     /// larger than one, if the finest level has so many texels.
     pub fn most_pixels(&self, texels: u32) -> f64 {

@@ -29,7 +29,7 @@ const VERSION: u32 = 1;
 const HEADER: usize = 64;
 
 /// Steps of yaw in a turn, and of scale.
-const STEPS: u32 = 4096;
+pub const STEPS: u32 = 4096;
 
 /// One tree, 16 bytes, as a shader reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

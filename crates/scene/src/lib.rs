@@ -25,8 +25,11 @@
 //! assert!((y - land.height(x, z)).abs() < 1e-5);
 //! ```
 
+mod budget;
 mod error;
+mod expected;
 mod file;
+mod filled;
 mod fractal;
 mod ground;
 mod heightmap;
@@ -38,23 +41,29 @@ mod scatter;
 mod scene;
 mod shade;
 mod sight;
+mod solve;
 mod species;
 mod surface;
 
+pub use budget::{Candidate, Choice, frontier, within_bytes, within_error};
 pub use error::SceneError;
 pub use file::{
     ForestSpec, FractalSpec, HeightmapSpec, LandSpec, PathSpec, SceneFile, SpeciesSpec, SunSpec,
 };
+pub use filled::{Filled, HEIGHT_BANDS, band_height, filled};
 pub use fractal::{Fractal, diamond_square};
 pub use ground::{Ground, PATCH, Patch, is_beside};
 pub use heightmap::Grey;
 pub use impostor::{IMPOSTOR_FADE, Impostor, LEAST_IMPOSTOR};
-pub use instances::{Instance, MOST_SPECIES, TILE, Tile};
+pub use instances::{Instance, MOST_SPECIES, STEPS, TILE, Tile};
 pub use land::{Land, MOST_POINTS};
 pub use need::{Fineness, SpeciesNeed, needs};
 pub use scatter::{MOST_TREES, Scatter};
 pub use scene::{Scene, open_land, plant, read_file, write_file};
-pub use shade::{Casters, DEPTH_STEPS, DIFFUSE, LOWEST_LIGHT, OpacityMap, Texel, foliage};
+pub use shade::{
+    Casters, DEPTH_STEPS, DIFFUSE, HEIGHT_STEPS, LOWEST_LIGHT, OpacityMap, Texel, foliage,
+};
 pub use sight::{Sight, Sky};
+pub use solve::{Solved, solve};
 pub use species::{Canopy, CanopyPoint, Species, Stance};
 pub use surface::{GroundVertex, ground_soup, ground_vertices};

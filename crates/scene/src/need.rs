@@ -59,12 +59,8 @@ impl Asked {
 /// # Errors
 /// When the views of a pack are damaged.
 pub fn needs(scene: &Scene, drawn: &Fineness) -> Result<Vec<SpeciesNeed>, SceneError> {
-    let mut sights: Vec<Sight> = scene.file.cameras.clone();
-    for path in &scene.file.paths {
-        sights.extend(scene.file.along(path));
-    }
     // Eyes, and pixels of a metre at a distance of one.
-    let eyes: Vec<(DVec3, f64)> = sights
+    let eyes: Vec<(DVec3, f64)> = sights(scene)
         .iter()
         .map(|s| {
             let camera = s.camera(&scene.land, [drawn.height; 2]);
@@ -88,11 +84,16 @@ pub fn needs(scene: &Scene, drawn: &Fineness) -> Result<Vec<SpeciesNeed>, SceneE
             for (eye, pixels) in &eyes {
                 let nearest = (foot.distance(*eye) - stance.reach() * scale).max(0.0);
                 let points = pixels * stance.unit * scale / nearest;
-                let tile = impostor.as_ref().map_or(f64::INFINITY, |i| {
+                let one = impostor.as_ref().map_or(Asked { points, ..NOTHING }, |i| {
                     let middle = foot + (DQuat::from_rotation_y(tree.yaw()) * i.center) * scale;
-                    pixels * i.side * scale / middle.distance(*eye)
+                    let distance = middle.distance(*eye);
+                    let asked = by_size(points, pixels * i.side * scale / distance, i, drawn);
+                    if i.is_within(scale, distance / SLACK) {
+                        Asked { points, ..asked }
+                    } else {
+                        asked
+                    }
                 });
-                let one = one(points, tile, impostor.as_ref(), drawn);
                 let entry = &mut asked[tree.species()];
                 *entry = entry.and(one);
             }
@@ -116,9 +117,14 @@ pub fn needs(scene: &Scene, drawn: &Fineness) -> Result<Vec<SpeciesNeed>, SceneE
     Ok(asked.into_iter().zip(&impostors).zip(light).map(need).collect())
 }
 
+/// All cameras of a scene and all pictures of its paths.
+pub(crate) fn sights(scene: &Scene) -> Vec<Sight> {
+    let along = scene.file.paths.iter().flat_map(|path| scene.file.along(path));
+    scene.file.cameras.iter().cloned().chain(along).collect()
+}
+
 /// What a tree asks for whose pack's units have so many pixels, and whose tiles so many along a side.
-fn one(points: f64, tile: f64, impostor: Option<&Impostor>, drawn: &Fineness) -> Asked {
-    let Some(impostor) = impostor else { return Asked { points, ..NOTHING } };
+fn by_size(points: f64, tile: f64, impostor: &Impostor, drawn: &Fineness) -> Asked {
     let [alone, largest] = impostor.range(impostor.texels, drawn.finest, drawn.impostors);
     let by_points = tile * SLACK >= alone || tile < LEAST_IMPOSTOR * SLACK;
     let by_views = tile < largest * SLACK && tile * SLACK >= LEAST_IMPOSTOR;
@@ -177,12 +183,11 @@ mod tests {
 
     #[test]
     fn trees_ask_for_points_beside_the_sizes_of_views() {
-        let of = |tile| one(7.0, tile, Some(&impostor()), &drawn(4.0));
+        let of = |tile| by_size(7.0, tile, &impostor(), &drawn(4.0));
         // Alone up to 80, none from 100 on.
         assert_eq!((of(60.0).points, of(60.0).tiles), (0.0, [60.0; 2]));
         assert_eq!((of(90.0).points, of(90.0).tiles), (7.0, [90.0; 2]));
         assert_eq!((of(120.0).points, of(120.0).tiles[1]), (7.0, 0.0));
         assert_eq!((of(3.0).points, of(3.0).tiles[1]), (7.0, 0.0));
-        assert_eq!(one(7.0, 60.0, None, &drawn(4.0)).points, 7.0);
     }
 }

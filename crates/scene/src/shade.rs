@@ -35,7 +35,7 @@ pub fn foliage(cosine: f64, translucency: f64) -> f64 {
 }
 
 /// What [`Texel`] heights are counted in: the whole range.
-const HEIGHT_STEPS: f64 = 65535.0;
+pub const HEIGHT_STEPS: f64 = 65535.0;
 
 /// A texel: top and bottom of the slab as shares of [`OpacityMap::heights`], optical depth in
 /// [`DEPTH_STEPS`], and a zero.

@@ -138,5 +138,7 @@ to far, with alpha tests and mips that keep coverage:
   enlarged to keep its area (R. L. Cook et al. 2007: simplifiers leave card trees bare); the level by pixels a triangle.
 * *billboards*: a quad a tree, the nearest of eight views of 256 texels, with normals and depth for the light.
 
-What is *drawn* of ours: trees that are neither beside the picture nor behind others; points are those looked at.
+*ours*: packs of points, triangles and views (289 directions, 128 texels); far trees are drawn by views, unless it says
+*without views*. Drawn are trees that are neither beside the picture nor behind others, nor estimated to be; points are
+those looked at. *Brightness* is the mean luminance of the crops over the truth's.
 ";

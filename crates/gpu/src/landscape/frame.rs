@@ -4,7 +4,7 @@ use crate::frame::FrameUniform;
 use crate::landscape::MOST_BANDS;
 use bytemuck::{Pod, Zeroable};
 use forest_points::PixelArea;
-use forest_scene::{OpacityMap, Sky, Tile, is_beside};
+use forest_scene::{HEIGHT_STEPS, OpacityMap, Sky, Tile, is_beside};
 use forest_soup::Camera;
 use glam::{DVec3, Vec3};
 
@@ -92,7 +92,7 @@ impl LightMapUniform {
             corner: map.corner.map(|v| v as f32),
             size: map.size,
             low: low as f32,
-            steps: (f64::from(u16::MAX) / (high - low)) as f32,
+            steps: (HEIGHT_STEPS / (high - low)) as f32,
             zero: [0; 2],
         }
     }

@@ -5,7 +5,7 @@ use crate::landscape::LandscapeDetail;
 use crate::landscape::impostors::ViewTables;
 use bytemuck::{Pod, Zeroable};
 use forest_points::{CellRecord, Order, PointsBlock, SizeCode};
-use forest_scene::{Canopy, IMPOSTOR_FADE, Species, Stance};
+use forest_scene::{Canopy, IMPOSTOR_FADE, STEPS, Species, Stance};
 use forest_soup::Camera;
 use forest_views::ViewsBlock;
 use glam::DVec3;
@@ -49,9 +49,10 @@ impl SpeciesRecord {
     /// Metres from which its trees are drawn by views alone; infinity without views.
     pub(crate) fn drawn_by_views_from(&self, camera: &Camera, detail: &LandscapeDetail) -> f64 {
         let largest = f64::from(self.view_most) * detail.impostors * detail.finest.0.sqrt();
-        let most_scale = f64::from(self.least + self.step * SCALE_STEPS as f32);
-        let pixels = camera.pixels_per_unit(1.0) * f64::from(self.view_side) * most_scale;
-        if pixels > 0.0 { pixels / (IMPOSTOR_FADE * largest) } else { f64::INFINITY }
+        let most_scale = f64::from(self.least + self.step * (STEPS - 1) as f32);
+        let metres = f64::from(self.view_side) * most_scale;
+        let pixels = camera.pixels_per_unit(1.0) * metres;
+        if pixels > 0.0 { metres.max(pixels / (IMPOSTOR_FADE * largest)) } else { f64::INFINITY }
     }
 }
 
@@ -87,9 +88,6 @@ pub(crate) struct Tables {
 
 /// Size codes there are, [`SizeCode::INFINITE`] among them.
 const CODES: u32 = 4096;
-
-/// Steps of an instance's scale.
-const SCALE_STEPS: f64 = 4095.0;
 
 impl Tables {
     /// Adds a species, whose points come after those of the ones before.
@@ -135,7 +133,7 @@ impl Tables {
             origin: from_foot(block.origin()).as_vec3().to_array(),
             block_unit: (block.scale() * unit) as f32,
             least: stance.scale[0] as f32,
-            step: ((stance.scale[1] - stance.scale[0]) / SCALE_STEPS) as f32,
+            step: ((stance.scale[1] - stance.scale[0]) / f64::from(STEPS - 1)) as f32,
             first_cell,
             cells: block.cells.len() as u32,
             first_code,

@@ -99,7 +99,7 @@ fn cull(
     if RUN == 0u {
         atomicAdd(&work.points, count);
         // Nothing stands in for a surfel, however large.
-        let cell = put_cell(t, s, stock, fine, 4094, visible.x, fade);
+        let cell = put_cell(t, s, stock, fine, i32(MOST_SIZE), visible.x, fade);
         if cell >= 0 {
             put_points(u32(cell), stock.first_point, count);
         }
@@ -160,7 +160,7 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32,
         place_of(t, stock.origin),
         stock.step * t.scale,
         fine,
-        4094,
+        i32(MOST_SIZE),
         fade,
         t.turn,
         s.unit * t.scale,
@@ -288,7 +288,7 @@ fn choose(
         let code = there(code_at_most(finest / (here * here)), s.least_fine);
         let fine = select(min(code, stock.root_parent - 1), block_fine, is_top);
         let largest = there(code_at_most(max(land.largest, finest) / (here * here)), s.least_coarse);
-        let coarse = select(4094, largest, s.has_triangles != 0u);
+        let coarse = select(i32(MOST_SIZE), largest, s.has_triangles != 0u);
         var count = 0u;
         if fine >= 0 || coarse >= 0 {
             count = points_above(stock.first_point, stock.points, fine);

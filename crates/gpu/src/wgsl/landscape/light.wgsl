@@ -131,7 +131,7 @@ fn depth_to_eye(place: vec3f, own: f32) -> f32 {
     let off = place + toward * own;
     let distance = max(length(place) - own, 0.0);
     // No farther than up to the highest tree.
-    let high = land.sky.low + 65535.0 / land.sky.steps - (off.y + land.eye.y);
+    let high = land.sky.low + HEIGHT_STEPS / land.sky.steps - (off.y + land.eye.y);
     let rise = max(toward.y, 1e-4);
     let reach = min(distance, select(distance, high / rise, toward.y > 0.0));
     var sum = 0.0;

@@ -85,8 +85,8 @@ fn tree_of(index: u32) -> Tree {
     var t: Tree;
     t.species = record.w >> 24u;
     let s = species_table[t.species];
-    t.scale = s.least + s.step * f32((record.w >> 12u) & 0xfffu);
-    let yaw = f32(record.w & 0xfffu) * (6.283185307179586 / 4096.0);
+    t.scale = s.least + s.step * f32((record.w >> 12u) & (STEPS - 1u));
+    let yaw = f32(record.w & (STEPS - 1u)) * (2.0 * HALF_TURN / f32(STEPS));
     t.turn = vec2f(cos(yaw), sin(yaw));
     t.foot = from_eye(bitcast<vec3f>(record.xyz));
     // Two trees do not share the samples that they cover.
@@ -116,9 +116,12 @@ fn board_of(t: Tree, s: Species) -> Board {
     }
     // In pixels, as thresholds are areas of samples.
     let pixel = land.pixel;
-    let side = frame.scale / (pixel * length(place_of(t, s.view_center))) * s.view_side * t.scale;
+    let distance = length(place_of(t, s.view_center));
+    let metres = s.view_side * t.scale;
+    let side = frame.scale / (pixel * distance) * metres;
     let largest = land.impostors * s.view_most * sqrt(land.finest) / pixel;
-    if side < LEAST_IMPOSTOR || side >= largest {
+    // Never about the eye: forest_scene::Impostor::is_within.
+    if side < LEAST_IMPOSTOR || side >= largest || distance < metres {
         return Board(0.0, 0u);
     }
     let share = min((1.0 - side / largest) / (1.0 - IMPOSTOR_FADE), 1.0);

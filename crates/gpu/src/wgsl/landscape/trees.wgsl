@@ -95,8 +95,8 @@ fn finest_seen(share: f32) -> f32 {
 // The largest size code whose area is at most `area` of square block units; −1 for none:
 // forest_points::SizeCode::at_most.
 fn code_at_most(area: f32) -> i32 {
-    let position = 4095.0 - (SIZE_TOP - log2(area)) * SIZES_PER_OCTAVE;
-    return i32(clamp(floor(position), -1.0, 4094.0));
+    let position = f32(MOST_SIZE + 1u) - (SIZE_TOP - log2(area)) * SIZES_PER_OCTAVE;
+    return i32(clamp(floor(position), -1.0, f32(MOST_SIZE)));
 }
 
 // A code that is not below what a pruned pack has.
