@@ -284,6 +284,50 @@ fn a_tree_about_the_eye_is_not_drawn_by_views() {
 }
 
 #[test]
+fn trees_drawn_by_views_are_whole_from_any_height() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let mut scene = Scene::open(&make_of(packs_with_views(), dir.path(), 100, &[])).unwrap();
+    scene.trees.retain(|t| t.species() == 1);
+    scene.trees.truncate(1);
+    // Ground is blue, and so is the sky.
+    (scene.file.land.color, scene.file.land.steep) = ([0, 0, 255], [0, 0, 255]);
+    for down in [0.0, 0.7, 1.3, 1.45, 1.53, std::f64::consts::FRAC_PI_2] {
+        let camera = alone(&scene, 60.0, down);
+        let covered = |impostors: f64| {
+            let usual = LandscapeDetail { hidden: 0.0, least_seen: 0.0, ..Default::default() };
+            let drawn =
+                draw(&gpu, &scene, &camera, &LandscapeDetail { impostors, ..usual }, false, 2);
+            let off = |p: &&[f32; 3]| p[0].max(p[1]) > p[2];
+            (drawn.pixels.iter().filter(off).count() as f64, drawn.counts.impostors)
+        };
+        let [(points, none), (views, one)] = [0.0, 100.0].map(covered);
+        assert_eq!((none, one), (0, 1), "{down}");
+        assert!((0.9..1.15).contains(&(views / points)), "{down}: {views} of {points}");
+    }
+}
+
+#[test]
+fn flying_on_changes_pictures_evenly() {
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make_of(packs_with_views(), dir.path(), 1500, &[])).unwrap();
+    let start = scene.file.camera(None).unwrap().camera(&scene.land, [160, 90]);
+    for impostors in [1.0, 0.0] {
+        let detail = LandscapeDetail { impostors, ..LandscapeDetail::default() };
+        let frame = |k: u32| {
+            let eye = start.eye + start.forward * (0.5 * f64::from(k));
+            draw(&gpu, &scene, &Camera { eye, ..start }, &detail, false, 4).pixels
+        };
+        let frames: Vec<Vec<[f32; 3]>> = (0..25).map(frame).collect();
+        let off = |(a, b): (&[f32; 3], &[f32; 3])| f64::from((a[1] - b[1]).abs());
+        let step = |w: &[Vec<[f32; 3]>]| w[0].iter().zip(&w[1]).map(off).sum::<f64>();
+        let mut steps: Vec<f64> = frames.windows(2).map(step).collect();
+        steps.sort_by(f64::total_cmp);
+        let [median, worst] = [steps[12], steps[23]];
+        assert!(worst < 1.5 * median, "impostors {impostors}: a step of {worst} among {median}");
+    }
+}
+
+#[test]
 fn trunks_before_their_own_crowns_column_are_not_left_out() {
     let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
     let scene = Scene::open(&make(dir.path(), 4000, &[])).unwrap();
@@ -520,7 +564,6 @@ fn more_bytes_are_spent_on_what_is_seen_and_are_worth_it() {
         let pixels = draw(&gpu, &lean, &camera, &detail, false, 2).pixels;
         let off = |(a, b): (&[f32; 3], &[f32; 3])| f64::from((a[1] - b[1]).powi(2));
         let error = full.iter().zip(&pixels).map(off).sum::<f64>().sqrt();
-        eprintln!("{bytes}: {sum} {expected} {error}");
         assert!(expected < last.0 && error < last.1, "{bytes}: {expected}, {error} after {last:?}");
         last = (expected, error);
     }

@@ -127,7 +127,8 @@ fn lines(rows: &[Row], wanted: impl Fn(&Row) -> bool) -> String {
 const NOTES: &str = "\
 *FLIP* is the mean over three crops of 160 × 90 pixels (horizon, middle, foreground) against rays through all
 trees at full detail with sun and sky shadows, 36 samples a pixel: one sample a pixel alone is noise, for all ways
-alike. The light is the same for all (opacity maps along the sun and from above), so what differs is geometry.
+alike. The shadows are the same for all (opacity maps along the sun and from above); our views are lit as foliage whose
+leaves face all ways, all else by normals. By normals our views had FLIP 0.248 instead of 0.198 (200,000 trees, s_m 16).
 
 Peers, drawn by the same device in the same run, all instanced, culled by tile and by tree on the CPU, from near
 to far, with alpha tests and mips that keep coverage:

@@ -57,11 +57,17 @@ fn tile_at(v: ViewFrame, center: vec3f, direction: vec3f, half: f32) -> vec2f {
     return 0.5 * at + 0.5;
 }
 
-// First and last place of what a view shows, from −1 to 1 on its tile.
-fn shown(view: u32, texels: f32) -> vec4f {
+// First and last place of what a view shows along two axes, from −1 to 1 on the view's tile. (From far
+// above, views around the direction to the eye are turned against it and one another.)
+fn shown(v: ViewFrame, view: u32, texels: f32, right: vec3f, down: vec3f) -> vec4f {
     let tile = tile_of(view);
-    let low = vec2f(tile.corner) * (2.0 / texels) - 1.0;
-    return vec4f(low, low + vec2f(tile.size) * (2.0 / texels));
+    let half = vec2f(tile.size) / texels;
+    let middle = vec2f(tile.corner) * (2.0 / texels) - 1.0 + half;
+    let x = vec2f(dot(right, v.right.xyz), dot(down, v.right.xyz));
+    let y = -vec2f(dot(right, v.up.xyz), dot(down, v.up.xyz));
+    let at = x * middle.x + y * middle.y;
+    let reach = abs(x) * half.x + abs(y) * half.y;
+    return vec4f(at - reach, at + reach);
 }
 
 @vertex
@@ -71,7 +77,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let center = place_of(t, s.view_center);
     let toward = -normalize(center);
     var out: Corner;
-    let right = normalize(vec3f(toward.z, 0.0, -toward.x));
+    let aside = length(toward.xz);
+    let right = select(vec3f(1.0, 0.0, 0.0), vec3f(toward.z, 0.0, -toward.x) / aside, aside > 1e-6);
     let up = cross(toward, right);
     // In the tree's own frame.
     let back = vec2f(t.turn.x, -t.turn.y);
@@ -86,9 +93,13 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let board = board_of(t, s);
     let level = levels[s.first_level + board.level];
     // The quad holds what the three show.
-    let a = shown(level.first_tile + views.x, level.texels);
-    let b = shown(level.first_tile + views.y, level.texels);
-    let c = shown(level.first_tile + views.z, level.texels);
+    let frames = s.first_frame + views;
+    let v = array(view_frames[frames.x], view_frames[frames.y], view_frames[frames.z]);
+    let across = turned(back, right);
+    let down = turned(back, -up);
+    let a = shown(v[0], level.first_tile + views.x, level.texels, across, down);
+    let b = shown(v[1], level.first_tile + views.y, level.texels, across, down);
+    let c = shown(v[2], level.first_tile + views.z, level.texels, across, down);
     let low = min(min(a.xy, b.xy), c.xy);
     let high = max(max(a.zw, b.zw), c.zw);
     let corner = mix(low, high, vec2f(f32(index & 1u), f32(index >> 1u)));
@@ -102,12 +113,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     out.position = flat_clip(at.xy, depth_value(depth));
     let local = turned(back, center);
     let ray = turned(back, out.place);
-    let frames = s.first_frame + views;
-    out.at = level.texels * vec4f(
-        tile_at(view_frames[frames.x], local, ray, half),
-        tile_at(view_frames[frames.y], local, ray, half),
-    );
-    out.at_last = level.texels * tile_at(view_frames[frames.z], local, ray, half);
+    out.at = level.texels * vec4f(tile_at(v[0], local, ray, half), tile_at(v[1], local, ray, half));
+    out.at_last = level.texels * tile_at(v[2], local, ray, half);
     out.views = views + level.first_tile;
     out.rise = toward * select(0.0, half * level.reach, level.has_depth != 0u);
     out.mask = t.mask;
