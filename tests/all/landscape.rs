@@ -3,7 +3,7 @@
 use crate::support::{arg, forest_bake, repo, run, succeed};
 use forest_gpu::{
     Gpu, Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Options,
-    instance, read_samples,
+    adapters, instance, read_samples,
 };
 use forest_points::PixelArea;
 use forest_scene::{Scene, Sight};
@@ -15,6 +15,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::LazyLock;
+use wgpu::Backend;
 
 const TREES: [&str; 3] = ["conifer.glb", "broadleaf_young.gltf", "shrub.obj"];
 
@@ -67,6 +68,13 @@ fn make_of(packs: &[PathBuf], folder: &Path, trees: u32, more: &[&str]) -> PathB
     args.extend(more);
     succeed(&args);
     path
+}
+
+/// An OpenGL device, where there is one.
+fn opengl() -> Option<Gpu> {
+    let all = adapters(&instance(true, None));
+    let found = all.into_iter().find(|a| a.get_info().backend == Backend::Gl);
+    found.map(|adapter| Gpu::of(adapter).unwrap())
 }
 
 fn device() -> Gpu {
@@ -265,6 +273,24 @@ fn alone(scene: &Scene, distance: f64, down: f64) -> Camera {
     let from = DVec3::new(0.0, sin, cos);
     let projection = Projection::Perspective { fov_y: 0.3 };
     Camera::new(middle + from * distance, -from, projection, [128, 128])
+}
+
+#[test]
+fn opengl_draws_the_same_landscape() {
+    let Some(gl) = opengl() else {
+        eprintln!("skipped: no OpenGL adapter");
+        return;
+    };
+    let (gpu, dir) = (device(), tempfile::tempdir().unwrap());
+    let scene = Scene::open(&make_of(packs_with_views(), dir.path(), 600, &[])).unwrap();
+    let camera = scene.file.camera(None).unwrap().camera(&scene.land, [320, 180]);
+    // One band there: what is hidden is known only of what lies before all trees.
+    let detail = LandscapeDetail { hidden: 0.0, least_seen: 0.0, ..LandscapeDetail::default() };
+    let [a, b] = [&gl, &gpu].map(|g| draw(g, &scene, &camera, &detail, false, 1));
+    assert_eq!(a.counts.impostors, b.counts.impostors);
+    let off = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.02);
+    let differ = a.pixels.iter().zip(&b.pixels).filter(|p| off(*p)).count();
+    assert!(differ * 50 < a.pixels.len(), "{differ} of {} samples", a.pixels.len());
 }
 
 #[test]

@@ -14,7 +14,6 @@ pub(crate) enum Kind {
     Write,
     Texture,
     TextureArray,
-    Depth,
 }
 
 /// The layout of a group whose binding number i is `kinds[i]`.
@@ -39,11 +38,6 @@ pub(crate) fn layout(
                 Kind::Uniform => buffer(BufferBindingType::Uniform),
                 Kind::Read => buffer(BufferBindingType::Storage { read_only: true }),
                 Kind::Write => buffer(BufferBindingType::Storage { read_only: false }),
-                Kind::Depth => BindingType::Texture {
-                    sample_type: TextureSampleType::Depth,
-                    view_dimension: TextureViewDimension::D2,
-                    multisampled: false,
-                },
                 Kind::Texture => texture(TextureViewDimension::D2),
                 Kind::TextureArray => texture(TextureViewDimension::D2Array),
             },

@@ -146,6 +146,7 @@ fn constants() -> String {
         ("MOST_BANDS", landscape::MOST_BANDS as u32),
         ("RUN_TRIANGLES", landscape::RUN_TRIANGLES),
         ("BUCKETS", landscape::BUCKETS),
+        ("MOST_DRAWS", 4 * forest_scene::MOST_SPECIES as u32),
         ("COMPASS_AROUND", landscape::COMPASS[0]),
         ("COMPASS_UP", landscape::COMPASS[1]),
         ("RAW_SIDE", crate::volume::RAW_SIDE),

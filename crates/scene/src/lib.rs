@@ -4,7 +4,7 @@
 //! * [`Scatter`] plants trees on it: a table of [`Instance`]s, 16 bytes each, in a file of its own.
 //! * [`Scene`] is what a scene file ([`SceneFile`], TOML) names, opened.
 //! * [`OpacityMap`] says how much light reaches a place between the trees.
-//! * [`points_needs`] says what its cameras can ever ask of each pack.
+//! * [`needs`] says what its cameras can ever ask of each pack, [`solve`] what to keep of them for so many bytes.
 //!
 //! Nothing is drawn here: that is `forest-gpu`'s, with ground truth from `forest-raster`.
 //!

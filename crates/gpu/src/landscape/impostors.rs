@@ -6,12 +6,13 @@
 use crate::bind;
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::landscape::RUN_TRIANGLES;
 use crate::landscape::pass::LandscapeRenderer;
 use crate::sheet::{Place, Sheet};
 use crate::textures::array_view;
 use crate::views::{FrameRecord, frame_records, page_format, page_texels};
 use bytemuck::{Pod, Zeroable};
-use forest_scene::{Impostor, Stance};
+use forest_scene::{Impostor, MOST_SPECIES, Stance};
 use forest_views::{Channel, Directions, Quality, TileRecord, ViewsBlock};
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
@@ -24,8 +25,9 @@ pub(crate) const COMPASS: [u32; 2] = [256, 128];
 pub(crate) const BUCKETS: u32 = 1024;
 pub(crate) const BUCKETS_PER_OCTAVE: u32 = 64;
 
-/// Words of `Boards` before its list.
-pub(crate) const BOARDS_HEAD: usize = 4 + BUCKETS as usize;
+/// Words of `Boards` before the draws of triangles, and before its list.
+const BEFORE_DRAWS: usize = 4 + BUCKETS as usize;
+const BOARDS_HEAD: usize = BEFORE_DRAWS + 4 * MOST_SPECIES;
 
 /// Impostors that a workgroup sorts.
 pub(crate) const SORTED_AT_ONCE: u32 = 256;
@@ -136,9 +138,10 @@ impl Impostors {
         let storage = BufferUsages::STORAGE;
         // Where there are no views there are no impostors.
         let room = if views.is_empty() { 1 } else { count.max(1) };
-        let boards = gpu.buffer("impostors", BOARDS_HEAD as u64 * 4 + room * 8, storage)?;
+        let indirect = storage | BufferUsages::INDIRECT;
+        let boards = gpu.buffer("impostors", BOARDS_HEAD as u64 * 4 + room * 8, indirect)?;
         let sorted = gpu.buffer("sorted impostors", room * 4, storage)?;
-        let draw = gpu.buffer("draw of impostors", 16, storage | BufferUsages::INDIRECT)?;
+        let draw = gpu.buffer("draw of impostors", 16, indirect)?;
         let pages = Pages::load(gpu, views, &tables.rules)?;
         let tiles = gpu.storage("tiles", &[bytemuck::cast_slice(&pages.tiles)])?;
         let levels = gpu.storage("levels", &[bytemuck::cast_slice(&tables.levels)])?;
@@ -167,10 +170,16 @@ impl Impostors {
         &self.boards
     }
 
-    /// Forgets those of the last frame.
+    /// Forgets those of the last frame, and all runs of triangles.
     pub(crate) fn clear(&self, gpu: &Gpu) {
-        let none = [0u32; BOARDS_HEAD];
-        gpu.queue.write_buffer(&self.boards, 0, bytemuck::cast_slice(&none));
+        let mut head = [0u32; BOARDS_HEAD];
+        head[BEFORE_DRAWS..].iter_mut().step_by(4).for_each(|v| *v = 3 * RUN_TRIANGLES);
+        gpu.queue.write_buffer(&self.boards, 0, bytemuck::cast_slice(&head));
+    }
+
+    /// Where in [`Impostors::boards`] the draw of a species' triangles lies, in bytes.
+    pub(crate) fn draw_of_triangles(species: u64) -> u64 {
+        4 * BEFORE_DRAWS as u64 + 16 * species
     }
 
     /// Bytes that they take on the device.

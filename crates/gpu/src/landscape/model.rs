@@ -4,11 +4,11 @@ use crate::bind;
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::frame::FrameUniform;
+use crate::landscape::MOST_BANDS;
 use crate::landscape::frame::{Bands, LandUniform, LandscapeDrawn, LightMapUniform};
 use crate::landscape::impostors::Impostors;
 use crate::landscape::pass::LandscapeRenderer;
 use crate::landscape::tables::{SpeciesRecord, Tables};
-use crate::landscape::{MOST_BANDS, RUN_TRIANGLES};
 use crate::points::{CellUniform, ChunkRecord};
 use crate::triangles::TrianglesModel;
 use bytemuck::{Pod, Zeroable};
@@ -68,7 +68,6 @@ pub struct Landscape<'s> {
     pub(crate) work: Buffer,
     pub(crate) arguments: Buffer,
     pub(crate) steps_group: BindGroup,
-    pub(crate) draws: Buffer,
     pub(crate) large: Buffer,
     pub(crate) large_group: BindGroup,
     pub(crate) triangles: Vec<Option<TrianglesModel>>,
@@ -112,19 +111,17 @@ impl<'s> Landscape<'s> {
             gpu.buffer("cells of trees", MOST_CELLS * size_of::<CellUniform>() as u64, storage)?;
         let radii = table("radii", bytemuck::cast_slice(&tables.radii))?;
         let trees = table("trees", bytemuck::cast_slice(&scene.trees))?;
+        let codes = table("size codes", bytemuck::cast_slice(&tables.codes()))?;
         let species = table("species", bytemuck::cast_slice(&tables.species))?;
         let stocks = table("cells of species", bytemuck::cast_slice(&tables.stocks))?;
         let work_bytes = WORK_HEAD as u64 * 4 + MOST_NEAR * 8;
         let work = gpu.buffer("work", work_bytes, storage | BufferUsages::COPY_SRC)?;
         let chunk = size_of::<ChunkRecord>() as u64;
         let chunks = gpu.buffer("chunks of points", MOST_CHUNKS * chunk, storage)?;
-        let prefixes = table("prefixes", bytemuck::cast_slice(&tables.prefixes))?;
-        let sizes = table("sizes of triangles", bytemuck::cast_slice(&tables.triangle_sizes))?;
         let kinds = scene.species.len() as u64;
         let runs_each = u64::from(MOST_RUNS) * 16;
         let runs = gpu.buffer("runs of triangles", kinds * runs_each, storage)?;
         let indirect = storage | BufferUsages::INDIRECT;
-        let draws = gpu.buffer("draws of triangles", kinds * 16, indirect)?;
         let there: Vec<_> = views.iter().flatten().collect();
         let (planted, count) = ([&trees, &species], scene.trees.len() as u64);
         let impostors = Impostors::load(gpu, renderer, &there, &tables.views, planted, count)?;
@@ -194,13 +191,13 @@ impl<'s> Landscape<'s> {
         let stances = scene.stances();
         let choose = [&points, &tile_list, &radii, &trees, &species, &stocks, &work, &cells]
             .into_iter()
-            .chain([&chunks, &prefixes, &sizes, &runs, &draws, impostors.boards()])
+            .chain([&chunks, &codes, &runs, impostors.boards()])
             .cloned()
             .collect();
         let splat = [&points, &cells, &radii, &chunks, &large, &work].map(Buffer::clone).into();
-        let all = [&points, &cells, &radii, &trees, &species, &stocks, &work, &chunks, &prefixes]
+        let all = [&points, &cells, &radii, &trees, &species, &stocks, &work, &chunks, &codes]
             .into_iter()
-            .chain([&sizes, &runs, &draws, &large, &tile_list, &sun_map, &sky_map, &vertices])
+            .chain([&runs, &large, &tile_list, &sun_map, &sky_map, &vertices])
             .chain([&patches]);
         let bytes = all.map(Buffer::size).sum::<u64>()
             + triangles.iter().flatten().map(|t| t.bytes()).sum::<u64>()
@@ -223,7 +220,6 @@ impl<'s> Landscape<'s> {
             work,
             arguments,
             steps_group,
-            draws,
             large,
             large_group,
             triangles,
@@ -299,10 +295,7 @@ impl<'s> Landscape<'s> {
         let patches: Vec<PatchRecord> = patches.into_iter().map(record).collect();
         queue.write_buffer(&self.patches, 0, bytemuck::cast_slice(&patches));
         queue.write_buffer(&self.work, 0, bytemuck::cast_slice(&[0u32; WORK_HEAD]));
-        let draw = [3 * RUN_TRIANGLES, 0, 0, 0];
-        let draws: Vec<[u32; 4]> = vec![draw; self.triangles.len()];
         self.impostors.clear(gpu);
-        queue.write_buffer(&self.draws, 0, bytemuck::cast_slice(&draws));
         // Four corners, no instance yet.
         queue.write_buffer(&self.large, 0, bytemuck::cast_slice(&[4u32, 0, 0, 0]));
     }

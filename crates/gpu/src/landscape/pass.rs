@@ -4,7 +4,7 @@ use crate::bind::{self, Kind};
 use crate::device::Gpu;
 use crate::error::GpuError;
 use crate::landscape::frame::LandscapeDetail;
-use crate::landscape::impostors::SORTED_AT_ONCE;
+use crate::landscape::impostors::{Impostors, SORTED_AT_ONCE};
 use crate::landscape::model::{Landscape, WORK_HEAD};
 use crate::landscape::target::LandscapeTarget;
 use crate::landscape::{MOST_BANDS, PATCH_VERTICES};
@@ -28,7 +28,7 @@ const BANDS: usize = 8;
 const _: () = assert!(BANDS <= MOST_BANDS);
 
 /// Storage buffers that a shader binds.
-const STORAGE_BUFFERS: u32 = 18;
+const STORAGE_BUFFERS: u32 = 16;
 
 /// The layouts of a landscape's groups.
 #[derive(Debug)]
@@ -54,12 +54,12 @@ impl Layouts {
         let compute = ShaderStages::COMPUTE;
         let layout =
             |label, stages, kinds: &[Kind]| bind::layout(&gpu.device, label, stages, kinds);
-        let choose = [r, r, r, r, r, r, w, w, w, r, r, r, w, w, w];
+        let choose = [r, r, r, r, r, r, w, w, w, r, r, w, w];
         let pages = Kind::TextureArray;
         Self {
             land: layout("land", drawn | compute, &[u, u, r, r]),
             ground: layout("ground", drawn, &[r, r, u]),
-            start: layout("start", compute, &[w, Kind::Depth]),
+            start: layout("start", compute, &[w, Kind::Texture]),
             near: layout("nearness", compute, &[r, w]),
             choose: layout("choose", compute, &choose),
             steps: layout("steps", compute, &[w, w]),
@@ -328,7 +328,8 @@ impl LandscapeRenderer {
         for (i, triangles) in (0..).zip(&land.triangles) {
             if let Some(triangles) = triangles {
                 pass.set_bind_group(1, triangles.group(), &[]);
-                pass.draw_indirect(&land.draws, i * 16);
+                let draw = Impostors::draw_of_triangles(i);
+                pass.draw_indirect(land.impostors.boards(), draw);
             }
         }
         if land.has_views {

@@ -80,8 +80,8 @@ pub(crate) struct Tables {
     pub(crate) species: Vec<SpeciesRecord>,
     pub(crate) stocks: Vec<StockRecord>,
     pub(crate) radii: Vec<f32>,
-    pub(crate) prefixes: Vec<u32>,
-    pub(crate) triangle_sizes: Vec<u32>,
+    prefixes: Vec<u32>,
+    triangle_sizes: Vec<u32>,
     pub(crate) views: ViewTables,
     points: u32,
 }
@@ -160,6 +160,15 @@ impl Tables {
         });
         self.points += block.points.len() as u32;
         Ok(())
+    }
+}
+
+impl Tables {
+    /// Prefixes of all species, then size codes of all their triangles: to be asked for once, last.
+    pub(crate) fn codes(&mut self) -> Vec<u32> {
+        let before = self.prefixes.len() as u32;
+        self.species.iter_mut().for_each(|s| s.first_triangle += before);
+        [std::mem::take(&mut self.prefixes), std::mem::take(&mut self.triangle_sizes)].concat()
     }
 }
 

@@ -21,13 +21,11 @@ struct Runs {
 // (The cells of points.wgsl are not used here.)
 @group(1) @binding(1) var<storage, read> tiles: Tiles;
 // Of each species and size code, points of the block's own tree whose parent is larger.
-@group(1) @binding(10) var<storage, read> prefixes: array<u32>;
-@group(1) @binding(11) var<storage, read> triangle_sizes: array<u32>;
-@group(1) @binding(12) var<storage, read_write> runs: Runs;
-// Of each species, the arguments of its draw: vertices, runs, zeros.
-@group(1) @binding(13) var<storage, read_write> draws: array<atomic<u32>>;
+// Then size codes of triangles. (One buffer: OpenGL binds 16 a stage.)
+@group(1) @binding(10) var<storage, read> codes: array<u32>;
+@group(1) @binding(11) var<storage, read_write> runs: Runs;
 
-@group(1) @binding(14) var<storage, read_write> boards: Boards;
+@group(1) @binding(12) var<storage, read_write> boards: Boards;
 
 // A tree each: what is far is drawn at once or put down as one cell, what is near is listed.
 @compute @workgroup_size(TILE)
@@ -88,7 +86,7 @@ fn cull(
         return;
     }
     let stock = stocks[s.first_cell + s.cells - 1u];
-    let count = prefixes[s.first_code + u32(fine)];
+    let count = codes[s.first_code + u32(fine)];
     if count <= land.few {
         if RUN == 0u {
             atomicAdd(&work.points, count);
@@ -224,7 +222,7 @@ fn triangles_above(first: u32, count: u32, coarse: i32) -> u32 {
     var high = count;
     while low < high {
         let middle = (low + high) / 2u;
-        if i32(triangle_sizes[first + middle]) > coarse {
+        if i32(codes[first + middle]) > coarse {
             low = middle + 1u;
         } else {
             high = middle;
@@ -235,7 +233,7 @@ fn triangles_above(first: u32, count: u32, coarse: i32) -> u32 {
 
 fn put_triangles(s: Species, species: u32, cell: u32, first: u32, count: u32) {
     let needed = (count + RUN_TRIANGLES - 1u) / RUN_TRIANGLES;
-    let slot = atomicAdd(&draws[species * 4u + 1u], needed);
+    let slot = atomicAdd(&boards.draws[species * 4u + 1u], needed);
     for (var k = 0u; k < needed; k++) {
         if slot + k >= s.runs {
             atomicAdd(&work.left_out, 1u);

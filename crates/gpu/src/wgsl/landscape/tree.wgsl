@@ -14,7 +14,7 @@ struct Species {
     // Its cells; the last one is the block's own tree.
     first_cell: u32,
     cells: u32,
-    // Its size codes in `prefixes`, and its radii.
+    // Its size codes, and its radii.
     first_code: u32,
     // Largest size code of a cell root's parent: from there on the block's own tree is all there is.
     root_parent: i32,
@@ -22,7 +22,7 @@ struct Species {
     has_triangles: u32,
     // Metres of a unit of radii.
     unit: f32,
-    // Its triangles in `triangle_sizes`.
+    // Size codes of its triangles.
     first_triangle: u32,
     // Of a pruned pack, codes below which nothing is there; −1.
     least_fine: i32,
