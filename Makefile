@@ -79,20 +79,31 @@ demo: gpu
 	@target/release/forest-bake verify $(OUT)/conifer.fpack
 	@target/release/forest-bake draw $(OUT)/conifer.fpack -o $(OUT)/conifer-volume.png --as volume \
 	  --level 7,6,5,4 --view 25,12 -q
-	@for what in points views volume; do \
+	@target/release/forest-bake foliage sample-data/conifer.glb -o $(OUT)/conifer.fpack
+	@target/release/forest-bake verify $(OUT)/conifer.fpack
+	@target/release/forest-bake draw $(OUT)/conifer.fpack -o $(OUT)/conifer-foliage.png --as foliage \
+	  --level 0,1,2,3 --view 25,12 -q
+	@rm -rf $(OUT)/wind $(OUT)/forest-wind
+	@target/release/forest-view $(OUT)/conifer.fpack --headless --as foliage --view 25,12 --size 480x480 \
+	  --sequence 2 --rate 10 -o $(OUT)/wind
+	@for what in points views volume foliage; do \
 	  target/release/forest-view $(OUT)/conifer.fpack --headless -o $(OUT)/view-$$what.png --as $$what \
 	    --view 25,12 --size 720x720 || exit 1; done
 	@for tree in broadleaf_young.gltf shrub.obj; do \
+	  target/release/forest-bake foliage sample-data/$$tree -o $(OUT)/$${tree%.*}.fpack -q || exit 1; \
 	  target/release/forest-bake views sample-data/$$tree -o $(OUT)/$${tree%.*}.fpack --texels 128 -q || exit 1; done
 	@target/release/forest-bake scene $(OUT)/conifer.fpack:height=16,weight=2 $(OUT)/broadleaf_young.fpack:height=12,weight=2 \
 	  $(OUT)/shrub.fpack:height=4 -o $(OUT)/forest.toml --trees 20000 --force
 	@target/release/forest-view $(OUT)/forest.toml --headless -o $(OUT)/forest.png --samples 2
+	@target/release/forest-view $(OUT)/forest.toml --headless --size 640x360 --sequence 2 --rate 10 -o $(OUT)/forest-wind
 	@target/release/forest-bake levels sample-data/conifer.glb > $(OUT)/conifer-levels.txt
 	@target/release/forest-bake inspect $(OUT)/block.fpack
 	@echo; echo "Packs:    $(OUT)/*.fpack"; \
 	echo "Pictures: $(OUT)/*.png (one tree at four levels of detail each; block.png: all of them together;"; \
 	echo "          conifer-views.png: from 289 directions; conifer-lookup.png: nearest, blended, through depth;"; \
-	echo "          conifer-volume.png: four levels of billboards; view-*.png: the viewer's)"; \
+	echo "          conifer-volume.png: four levels of billboards; conifer-foliage.png: four of meshes;"; \
+	echo "          view-*.png: the viewer's)"; \
+	echo "          wind/preview.png, forest-wind/preview.png: animated, in the wind"; \
 	echo "          forest.png: 20,000 of them on fractal land"; \
 	echo "Window:   target/release/forest-view $(OUT)/conifer.fpack, or $(OUT)/forest.toml"; \
 	echo "Export:   $(OUT)/conifer-three (for three.js)"; \

@@ -26,9 +26,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-views", &["forest-soup", "forest-raster", "forest-pack"]),
     ("forest-export", &["forest-soup", "forest-pack", "forest-views"]),
     ("forest-volume", &["forest-soup", "forest-raster", "forest-pack", "forest-vq"]),
+    ("forest-foliage", &["forest-soup", "forest-raster", "forest-pack", "forest-points"]),
     (
         "forest-draw",
         &[
+            "forest-foliage",
             "forest-soup",
             "forest-raster",
             "forest-pack",
@@ -40,6 +42,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "forest-eval",
         &[
+            "forest-foliage",
             "forest-soup",
             "forest-raster",
             "forest-pack",
@@ -52,6 +55,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "forest-gpu",
         &[
+            "forest-foliage",
             "forest-soup",
             "forest-raster",
             "forest-pack",
@@ -69,6 +73,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "forest-view",
         &[
+            "forest-foliage",
             "forest-soup",
             "forest-pack",
             "forest-import",
@@ -83,6 +88,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "forest-bake",
         &[
+            "forest-foliage",
             "forest-soup",
             "forest-pack",
             "forest-import",
@@ -99,6 +105,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "forest-tests",
         &[
+            "forest-foliage",
             "forest-soup",
             "forest-pack",
             "forest-import",

@@ -2,7 +2,8 @@
 //! same cut and ask the same hash.
 
 use crate::support::repo;
-use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_foliage::{FoliageBlock, FoliageOptions, Wind};
 use forest_gpu::{
     Costs, Drawn, Frame, Gpu, GpuError, Layer, Look, Model, Options, Renderer, What, adapters,
     candidates, instance, read_picture, read_samples,
@@ -15,7 +16,7 @@ use forest_points::{
 use forest_raster::{Light, Picture, Sampling, Style, Sun};
 use forest_soup::{Camera, Projection, TriangleSoup};
 use forest_tests::pictures::rmse;
-use forest_tests::{bake_bytes, bake_views, bake_volume, golden, open, with_section};
+use forest_tests::{bake_bytes, bake_foliage, bake_views, bake_volume, golden, open, with_section};
 use forest_views::{Directions, Dome, Layout, Lookup, Quality, ViewsBlock, ViewsOptions};
 use forest_volume::{
     Blending, Branching, CodebookOptions, Detail, Stand, VolumeBlock, VolumeOptions,
@@ -52,11 +53,15 @@ impl Device {
         light: Light,
         layers: &[Layer],
     ) -> (Picture, Drawn) {
-        let target = self.renderer.target(&self.gpu, [camera.width, camera.height], 1).unwrap();
-        let frame = Frame { camera: *camera, light, layers };
-        let drawn = self.renderer.render(&self.gpu, model, &target, &frame, None).unwrap();
+        self.draw_frame(model, &Frame { camera: *camera, light, wind: Wind::default(), layers })
+    }
+
+    fn draw_frame(&self, model: &mut Model, frame: &Frame) -> (Picture, Drawn) {
+        let [width, height] = [frame.camera.width, frame.camera.height];
+        let target = self.renderer.target(&self.gpu, [width, height], 1).unwrap();
+        let drawn = self.renderer.render(&self.gpu, model, &target, frame, None).unwrap();
         let pixels = read_samples(&self.gpu, &target).unwrap();
-        (Picture { pixels, ..Picture::empty(camera.width, camera.height) }, drawn)
+        (Picture { pixels, ..Picture::empty(width, height) }, drawn)
     }
 }
 
@@ -371,16 +376,110 @@ fn opengl_draws_the_same() {
     }
 }
 
+/// Foliage, at rest and bent by the wind.
+#[test]
+fn foliage_is_drawn_as_the_cpu_draws_it() {
+    let device = Device::new(Options::default());
+    let soup = tree("broadleaf_young.gltf");
+    for blocks in [true, false] {
+        let options = FoliageOptions { blocks, ..FoliageOptions::default() };
+        let pack = open(&bake_foliage(&soup, &options).unwrap().0).unwrap();
+        let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+        let block = FoliageBlock::open(&pack).unwrap();
+        let scene = FoliageScene::read(&block).unwrap();
+        let gale = Wind { strength: 1.0, time: 2.2, ..Wind::default() };
+        for (c, camera) in cameras(model.bounds()).iter().enumerate() {
+            let level = c % 3;
+            for (w, wind) in [Wind::default(), gale].into_iter().enumerate() {
+                let style = Style { sampling: Sampling::MIDDLE, light: Light::MORNING };
+                let cpu = scene.draw(camera, level, &wind, &style);
+                let layers = [Layer::whole(What::Foliage(level))];
+                let frame = Frame { camera: *camera, light: Light::MORNING, wind, layers: &layers };
+                let gpu = device.draw_frame(&mut model, &frame).0;
+                assert_same(&format!("foliage-{blocks}-{c}-{w}"), &gpu, &cpu);
+            }
+        }
+    }
+}
+
+/// In the wind, a change of representation moves the tree as little as at rest.
+#[test]
+fn representations_lean_alike_in_the_wind() {
+    let device = Device::new(Options::default());
+    let soup = tree("broadleaf_young.gltf");
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("t.fpack");
+    let mut writer = forest_pack::PackWriter::create(&path).unwrap();
+    let views = ViewsOptions {
+        directions: Directions::octahedral(64, Dome::Upper),
+        texels: 128,
+        ..ViewsOptions::default()
+    };
+    let volume = VolumeOptions { levels: 6, ..VolumeOptions::default() };
+    let mut there = std::collections::BTreeSet::new();
+    for pack in [
+        bake_foliage(&soup, &FoliageOptions::default()).unwrap().0,
+        bake_bytes(&soup, &BakeOptions { triangles: false, ..Default::default() }).unwrap().0,
+        bake_views(&soup, &views).unwrap(),
+        bake_volume(&soup, Stand::Dome { cameras: 9 }, &volume, None).unwrap().0,
+    ] {
+        let pack = open(&pack).unwrap();
+        for (id, _) in pack.sections() {
+            if there.insert(id) {
+                writer.copy(&pack, id).unwrap();
+            }
+        }
+    }
+    writer.finish().unwrap();
+    let pack = Pack::open(&path).unwrap();
+    let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+    let camera = Camera::around(model.bounds(), [20.0, 8.0], None, [SIDE; 2]);
+    // Mean place across of what covers the upper half of the picture, in pixels.
+    let mut middle = |what: What, wind: Wind| {
+        let layers = [Layer::whole(what)];
+        let frame = Frame { camera, light: Light::Albedo, wind, layers: &layers };
+        let picture = device.draw_frame(&mut model, &frame).0;
+        let upper = picture.pixels.iter().enumerate().take((SIDE * SIDE / 2) as usize);
+        let (sum, weight) = upper.fold((0.0, 0.0), |(sum, weight), (i, p)| {
+            let a = f64::from(p[3]);
+            (sum + a * f64::from(i as u32 % SIDE), weight + a)
+        });
+        sum / weight
+    };
+    let gale = Wind { strength: 1.0, time: 2.2, ..Wind::default() };
+    let mut shift = |what| middle(what, gale) - middle(what, Wind::default());
+    let foliage = shift(What::Foliage(0));
+    assert!(foliage.abs() > 1.0, "{foliage} px");
+    for what in [
+        What::Foliage(2),
+        What::Points(thresholds(1.0, 1e9, 0.0)),
+        What::Views(0, Lookup::Nearest),
+        What::Views(0, Lookup::Depth),
+        What::Volume(Detail::Level(5), Blending::Shares),
+    ] {
+        let own = shift(what);
+        // A quarter of a per cent of the tree.
+        assert!((own - foliage).abs() < 0.5, "{what:?}: {own} px, not {foliage}");
+    }
+}
+
 /// Two layers on complementary samples: of one level they are that level; of two, each sample is of
 /// one of them, so that no fade is denser or thinner than both its ends.
 #[test]
 fn fading_levels_share_the_samples() {
     let soup = tree("shrub.obj");
-    let pack = open(&bake_bytes(&soup, &BakeOptions::default()).unwrap().0).unwrap();
+    let points = bake_bytes(&soup, &BakeOptions::default()).unwrap().0;
+    let foliage = bake_foliage(&soup, &FoliageOptions::default()).unwrap().0;
+    let levels = [1.0, 64.0].map(|s| What::Points(thresholds(s, 16.0 * s, 0.0)));
+    levels_share_the_samples(&points, levels);
+    levels_share_the_samples(&foliage, [0, 2].map(What::Foliage));
+}
+
+fn levels_share_the_samples(bytes: &[u8], [fine, coarse]: [What; 2]) {
+    let pack = open(bytes).unwrap();
     let device = Device::new(Options::default());
     let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
     let camera = cameras(model.bounds())[2];
-    let [fine, coarse] = [1.0, 64.0].map(|s| What::Points(thresholds(s, 16.0 * s, 0.0)));
     let mut draw = |layers: &[Layer]| device.draw(&mut model, &camera, Light::MORNING, layers);
     let halves =
         |a, b, t: f32| [Layer { what: a, fade: [0.0, t] }, Layer { what: b, fade: [t, 1.0] }];
@@ -458,6 +557,9 @@ fn draw_everything(device: &Device, model: &mut Model) -> Result<(), GpuError> {
     if model.views().is_some() {
         all.push(What::Views(0, Lookup::Depth));
     }
+    if model.foliage().is_some() {
+        all.extend([What::Foliage(0), What::Foliage(1)]);
+    }
     if model.volume().is_some() {
         all.push(What::Volume(Detail::PIXEL, Blending::Shares));
     }
@@ -465,7 +567,8 @@ fn draw_everything(device: &Device, model: &mut Model) -> Result<(), GpuError> {
         let camera = Camera { width: 48, height: 48, ..camera };
         for what in &all {
             let layers = [Layer::whole(*what)];
-            let frame = Frame { camera, light: Light::MORNING, layers: &layers };
+            let wind = Wind { strength: 1.0, time: 2.0, ..Wind::default() };
+            let frame = Frame { camera, light: Light::MORNING, wind, layers: &layers };
             device.renderer.render(&device.gpu, model, &target, &frame, None)?;
             device.gpu.finish()?;
         }
@@ -473,7 +576,7 @@ fn draw_everything(device: &Device, model: &mut Model) -> Result<(), GpuError> {
     // Two layers, and levels by the table.
     let camera = Camera { width: 48, height: 48, ..cameras(model.bounds())[2] };
     let layers: Vec<Layer> = all.iter().map(|w| Layer { what: *w, fade: [0.2, 0.7] }).collect();
-    let frame = Frame { camera, light: Light::Albedo, layers: &layers };
+    let frame = Frame { camera, light: Light::Albedo, wind: Wind::default(), layers: &layers };
     device.renderer.render(&device.gpu, model, &target, &frame, None)?;
     device.gpu.finish()?;
     for candidate in candidates(model, &camera, &Costs::default()) {
@@ -509,7 +612,7 @@ fn pictures_are_the_samples_mean() {
     let camera = Camera { width: 60, height: 50, ..cameras(model.bounds())[2] };
     let target = device.renderer.target(&device.gpu, [60, 50], 3).unwrap();
     let layers = [Layer::whole(What::Points(Thresholds::default()))];
-    let frame = Frame { camera, light: Light::MORNING, layers: &layers };
+    let frame = Frame { camera, light: Light::MORNING, wind: Wind::default(), layers: &layers };
     device.renderer.render(&device.gpu, &mut model, &target, &frame, None).unwrap();
     let samples = read_samples(&device.gpu, &target).unwrap();
     let whole = Picture { pixels: samples, ..Picture::empty(180, 150) }.box_filtered(3);

@@ -13,7 +13,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Runs it and returns (exit code, stderr).
-fn view(args: &[&str]) -> (i32, String) {
+pub(crate) fn view(args: &[&str]) -> (i32, String) {
     let program = Path::new(forest_bake().get_program()).with_file_name("forest-view");
     // Mesa complains where this folder is not set.
     let folder = tempfile::tempdir().unwrap();
@@ -35,8 +35,12 @@ fn picture(path: &str) -> image::RgbaImage {
 fn draws_every_representation_without_a_window() {
     let dir = tempfile::tempdir().unwrap();
     let png = arg(&dir.path().join("t.png"));
-    let packs =
-        [("textured.fpack", "points"), ("views.fpack", "views"), ("volume.fpack", "volume")];
+    let packs = [
+        ("textured.fpack", "points"),
+        ("views.fpack", "views"),
+        ("volume.fpack", "volume"),
+        ("foliage.fpack", "foliage"),
+    ];
     for (pack, what) in packs {
         let pack = golden(pack);
         let line = [&pack, "--headless", "-o", &png, "--size", "120x80", "--as", what];

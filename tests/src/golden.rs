@@ -1,7 +1,8 @@
 //! The golden packs: what they are made of. `make golden` writes them; tests only read them.
 
-use crate::soups::{leaves, texture, textured};
-use crate::{bake_bytes, bake_views, bake_volume, open};
+use crate::soups::{leaves, small_tree, texture, textured};
+use crate::{bake_bytes, bake_foliage, bake_views, bake_volume, open};
+use forest_foliage::FoliageOptions;
 use forest_pack::measures::{Light, Measure, Measures};
 use forest_pack::{PackError, PackWriter, kind};
 use forest_points::{BakeOptions, Calibration, GridChoice, Order, RadiusRule, SurfelSize};
@@ -24,6 +25,8 @@ enum Content {
     Points { options: BakeOptions, measured: bool },
     /// Views, and nothing else.
     Views(ViewsOptions),
+    /// Foliage, and nothing else.
+    Foliage(FoliageOptions),
     /// A volume, and nothing else.
     Volume(VolumeOptions, CodebookOptions),
 }
@@ -49,6 +52,9 @@ impl Golden {
             }
             Content::Views(options) => {
                 bake_views(&self.soup, options).expect("a golden soup bakes")
+            }
+            Content::Foliage(options) => {
+                bake_foliage(&self.soup, options).expect("a golden soup bakes").0
             }
             Content::Volume(options, codebook) => {
                 let stand = Stand::Dome { cameras: 5 };
@@ -145,6 +151,17 @@ pub fn all() -> Vec<Golden> {
                 VolumeOptions { levels: 3, ..VolumeOptions::default() },
                 CodebookOptions { size: CodebookSize::Words(40), ..CodebookOptions::default() },
             ),
+        },
+        Golden {
+            name: "foliage.fpack",
+            soup: small_tree(),
+            content: Content::Foliage(FoliageOptions {
+                texel: Some(0.15),
+                levels: 2,
+                // Without blocks, as views.
+                blocks: false,
+                ..FoliageOptions::default()
+            }),
         },
         Golden {
             name: "measured.fpack",

@@ -8,7 +8,8 @@ pub mod reports;
 pub mod screen;
 pub mod soups;
 
-use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_foliage::{FoliageBlock, FoliageError, FoliageOptions, Wind};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{ErrorKind, Light, Measures, Need};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
@@ -99,6 +100,23 @@ pub fn write_volume(
     Ok((std::fs::read(&path).expect("the pack"), report))
 }
 
+/// Bakes foliage into memory; the pack has a fixed `meta` section.
+///
+/// # Errors
+/// As [`forest_foliage::bake`].
+pub fn bake_foliage(
+    soup: &TriangleSoup,
+    options: &FoliageOptions,
+) -> Result<(Vec<u8>, forest_foliage::BakeReport), FoliageError> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
+    let report = forest_foliage::bake(soup, options, &mut writer, &|_| {})?;
+    writer.finish()?;
+    Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+}
+
 /// The trees that a report is about: these of sample-data, and these of ../shared/trees where they
 /// are; the others are named on stderr.
 pub fn report_trees(samples: &[&str], shared: &[&str]) -> Vec<PathBuf> {
@@ -145,6 +163,7 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
     }
     let mut drawn = if ViewsBlock::is_in(&pack) { use_views(&pack)? } else { 0 };
     drawn += if VolumeBlock::is_in(&pack) { use_volume(&pack)? } else { 0 };
+    drawn += if FoliageBlock::is_in(&pack) { use_foliage(&pack)? } else { 0 };
     if drawn > 0 && !PointsBlock::is_in(&pack) {
         return Ok(drawn);
     }
@@ -204,6 +223,26 @@ fn use_volume(pack: &Pack) -> Result<usize, PackError> {
                 let (_, cost) = scene.draw(&camera, detail, blending, Sampling::MIDDLE);
                 drawn += cost.billboards as usize;
             }
+        }
+    }
+    Ok(drawn)
+}
+
+/// Decodes the foliage and draws every level, at rest and in a gale.
+fn use_foliage(pack: &Pack) -> Result<usize, PackError> {
+    let block = FoliageBlock::open(pack)?;
+    let scene = FoliageScene::read(&block)?;
+    let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
+    let gale = Wind { strength: 2.0, time: 3.0, ..Wind::default() };
+    let mut drawn = 0;
+    for distance in [None, Some(0.5), Some(3.0)] {
+        let camera = Camera::around(block.bounds(), [20.0, 10.0], distance, [8, 8]);
+        block.select(&camera, 1.0);
+        for level in 0..block.header.levels.len() {
+            for wind in [Wind::default(), gale] {
+                scene.draw(&camera, level, &wind, &style);
+            }
+            drawn += block.header.levels[level].triangles() as usize;
         }
     }
     Ok(drawn)

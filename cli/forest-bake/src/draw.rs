@@ -4,7 +4,8 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use anyhow::{Context, Result, bail};
-use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_foliage::{FoliageBlock, Wind};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
@@ -59,15 +60,20 @@ pub(crate) struct Args {
     /// How views are looked up; several give pictures side by side.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "depth")]
     lookup: Vec<LookupArg>,
-    /// Levels of a volume, 0 is the root; several give pictures side by side. Default: by --texel.
+    /// Levels of a volume, 0 is the root, or of foliage, 0 is the finest; several give pictures side by
+    /// side. Default: by --texel.
     #[arg(long, value_delimiter = ',', value_name = "N")]
     level: Vec<u32>,
     /// How the billboards of a volume's two nearest cameras make one.
     #[arg(long, value_enum, default_value = "shares")]
     blend: BlendArg,
-    /// Largest width of a texel in pixels: what chooses the level of views, and cells of a volume.
+    /// Largest width of a texel in pixels: what chooses the level of views and foliage, and cells of a
+    /// volume.
     #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive_wide)]
     texel: f64,
+    /// Wind that foliage stands in: its strength (0 calm, 1 a gale), or STRENGTH,SECONDS at a moment.
+    #[arg(long, default_value = "0", value_name = "WIND")]
+    wind: Wind,
     /// Light, without shadows.
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
@@ -87,6 +93,8 @@ enum Representation {
     Views,
     /// Billboards of an octree, in the light of their photographs.
     Volume,
+    /// Cards of leaves, sheets of twigs, tubes of branches; bent by --wind.
+    Foliage,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -137,18 +145,20 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let pack = Pack::open(&args.pack)?;
     let style =
         Style { sampling: Sampling { side: args.samples, seed: 1 }, light: args.light.light() };
-    let found = match [ViewsBlock::is_in(&pack), VolumeBlock::is_in(&pack)] {
-        _ if PointsBlock::is_in(&pack) => Representation::Points,
-        [true, _] => Representation::Views,
-        [false, true] => Representation::Volume,
-        // Says what is missing.
-        [false, false] => Representation::Points,
-    };
+    let found = [
+        (PointsBlock::is_in(&pack), Representation::Points),
+        (ViewsBlock::is_in(&pack), Representation::Views),
+        (VolumeBlock::is_in(&pack), Representation::Volume),
+        (FoliageBlock::is_in(&pack), Representation::Foliage),
+    ];
+    // Without any, opening points says what is missing.
+    let found = found.into_iter().find(|f| f.0).map_or(Representation::Points, |f| f.1);
     let what = args.what.unwrap_or(found);
     let pictures = match what {
         Representation::Points => draw_all_points(args, &pack, &style, quiet)?,
         Representation::Views => draw_all_views(args, &pack, &style, quiet)?,
         Representation::Volume => draw_all_volumes(args, &pack, &style, quiet)?,
+        Representation::Foliage => draw_all_foliage(args, &pack, &style, quiet)?,
     };
     write(args, &pictures)
 }
@@ -201,6 +211,40 @@ fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resul
                 block.directions().count(),
                 level.side(),
                 output::bytes(drawn.bytes),
+                picture.mean_coverage()
+            );
+        }
+        pictures.push(picture);
+    }
+    Ok(pictures)
+}
+
+fn draw_all_foliage(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+    if args.error.is_some() || args.budget.is_some() {
+        let rule =
+            "--error and --budget choose levels of points; --level and --texel those of foliage";
+        bail!(Usage(rule.into()));
+    }
+    let block = FoliageBlock::open(pack)?;
+    let camera = args.camera(block.bounds())?;
+    let coarsest = block.header.levels.len() as u32 - 1;
+    if let Some(level) = args.level.iter().find(|l| **l > coarsest) {
+        bail!(Usage(format!("--level {level}: the coarsest level of the pack is {coarsest}")));
+    }
+    let mut levels: Vec<usize> = args.level.iter().map(|&l| l as usize).collect();
+    if levels.is_empty() {
+        levels.push(block.select(&camera, args.texel));
+    }
+    let scene = FoliageScene::read(&block)?;
+    let mut pictures = Vec::new();
+    for level in levels {
+        let picture = scene.draw(&camera, level, &args.wind, style);
+        if !quiet {
+            let header = &block.header.levels[level];
+            eprintln!(
+                "level {level}: texel {:.4}, {} triangles, coverage {:.4}",
+                header.texel,
+                header.triangles(),
                 picture.mean_coverage()
             );
         }

@@ -5,12 +5,14 @@ use crate::light::LightArg;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource};
 use anyhow::{Context, Result};
-use forest_draw::{ViewsLevel, VolumeScene, read_surfaces};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, read_surfaces};
 use forest_eval::report::{self, Axis};
 use forest_eval::{
-    Baselines, Contender, Evaluation, Metric, Plan, Subject, Sweep, Truth, calibrate, machine,
-    measures, own_contenders, pictures, sweep, views_contenders, volume_contenders,
+    Baselines, Contender, Evaluation, Metric, Plan, Subject, Sweep, Truth, calibrate,
+    foliage_contenders, machine, measures, own_contenders, pictures, sweep, views_contenders,
+    volume_contenders,
 };
+use forest_foliage::FoliageBlock;
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, PackWriter, SectionId, kind};
@@ -91,7 +93,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let points = if PointsBlock::is_in(&pack) { Some(PointsBlock::open(&pack)?) } else { None };
     let views = if ViewsBlock::is_in(&pack) { Some(ViewsBlock::open(&pack)?) } else { None };
     let volume = if VolumeBlock::is_in(&pack) { Some(VolumeBlock::open(&pack)?) } else { None };
-    if points.is_none() && views.is_none() && volume.is_none() {
+    let foliage = if FoliageBlock::is_in(&pack) { Some(FoliageBlock::open(&pack)?) } else { None };
+    if points.is_none() && views.is_none() && volume.is_none() && foliage.is_none() {
         // Says what is missing.
         PointsBlock::open(&pack)?;
     }
@@ -114,6 +117,8 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     contenders.extend(views_contenders(&levels));
     let scene = volume.as_ref().map(VolumeScene::read).transpose()?;
     contenders.extend(volume_contenders(scene.as_ref()));
+    let leaves = foliage.as_ref().map(FoliageScene::read).transpose()?;
+    contenders.extend(foliage_contenders(leaves.as_ref()));
     let found = judge.sweep(&truth, &contenders)?;
     let exhibits = match args.html {
         Some(_) => report::gallery(&truth, &contenders, &plan, &found)?,

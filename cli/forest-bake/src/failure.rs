@@ -2,6 +2,7 @@
 
 use forest_eval::EvalError;
 use forest_export::ExportError;
+use forest_foliage::FoliageError;
 use forest_import::ImportError;
 use forest_pack::PackError;
 use forest_points::BakeError;
@@ -63,6 +64,14 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
             VolumeError::Options(_) => 1,
             VolumeError::Pack(e) => e.exit_code(),
             VolumeError::Soup(_) | VolumeError::NothingToSee(_) | VolumeError::Inconsistent(_) => 3,
+            _ => 4,
+        });
+    }
+    if let Some(e) = cause.downcast_ref::<FoliageError>() {
+        return Some(match e {
+            FoliageError::Options(_) | FoliageError::NoSuchMaterial { .. } => 1,
+            FoliageError::Pack(e) => e.exit_code(),
+            FoliageError::Soup(_) | FoliageError::NothingToSee | FoliageError::NoLeaves { .. } => 3,
             _ => 4,
         });
     }

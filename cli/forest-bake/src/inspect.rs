@@ -1,9 +1,12 @@
 //! `forest-bake inspect`.
 
+mod foliage;
 mod volume;
 
 use crate::output;
 use anyhow::Result;
+use foliage::FoliageReport;
+use forest_foliage::FoliageBlock;
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{Measure, Measures};
 use forest_pack::{Codec, Pack, SectionId, kind};
@@ -39,6 +42,7 @@ struct Report {
     points: Option<PointsReport>,
     views: Option<ViewsReport>,
     volume: Option<VolumeReport>,
+    foliage: Option<FoliageReport>,
     measures: Option<Measures>,
 }
 
@@ -210,6 +214,11 @@ impl Report {
             } else {
                 None
             },
+            foliage: if FoliageBlock::is_in(pack) {
+                Some(FoliageReport::of(&FoliageBlock::open(pack)?))
+            } else {
+                None
+            },
             volume: if VolumeBlock::is_in(pack) {
                 Some(VolumeReport::of(&VolumeBlock::open(pack)?))
             } else {
@@ -238,6 +247,9 @@ impl Report {
         }
         if let Some(v) = &self.views {
             v.text(&mut t)?;
+        }
+        if let Some(f) = &self.foliage {
+            f.text(&mut t)?;
         }
         if let Some(v) = &self.volume {
             v.text(&mut t)?;
@@ -282,7 +294,7 @@ fn measures_text(m: &Measures, t: &mut String) -> std::fmt::Result {
                 let lookup = Lookup::ALL.get(second as usize).map_or("?", |l| l.name());
                 (format!("{first}² {lookup}"), String::new())
             }
-            kind::VOLUME_HEADER => (format!("level {first}"), String::new()),
+            kind::VOLUME_HEADER | kind::FOLIAGE_HEADER => (format!("level {first}"), String::new()),
             _ => (format!("s_m {first}"), third.to_string()),
         };
         let mean =

@@ -5,6 +5,7 @@ mod draw;
 mod eval;
 mod export;
 mod failure;
+mod foliage;
 mod inspect;
 mod levels;
 mod light;
@@ -46,6 +47,8 @@ enum Command {
     Views(views::Args),
     /// Bake a volume: an octree of small billboards, from a mesh or from photographs.
     Volume(volume::Args),
+    /// Bake foliage: levels of cards, sheets and tubes that bend in the wind.
+    Foliage(foliage::Args),
     /// Photograph a tree from all around: RGBA images and a transforms.json.
     Capture(capture::Args),
     /// Write views as textures for engines: PNG, EXR, KTX2.
@@ -94,6 +97,7 @@ fn run(args: Args) -> anyhow::Result<()> {
         Command::Points(a) => points::run(&a, quiet),
         Command::Views(a) => views::run(&a, quiet),
         Command::Volume(a) => volume::run(&a, quiet),
+        Command::Foliage(a) => foliage::run(&a, quiet),
         Command::Capture(a) => capture::run(&a, quiet),
         Command::Export(a) => export::run(&a, quiet),
         Command::Scene(a) => scene::run(&a, quiet),

@@ -2,6 +2,7 @@
 
 use crate::output;
 use anyhow::Result;
+use forest_foliage::FoliageBlock;
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, SectionId, kind};
@@ -42,6 +43,11 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
     }
     if VolumeBlock::is_in(&pack) {
         VolumeBlock::open(&pack)?.texels()?;
+    }
+    if FoliageBlock::is_in(&pack) {
+        let block = FoliageBlock::open(&pack)?;
+        block.stored()?;
+        block.materials()?;
     }
     if !PointsBlock::is_in(&pack) {
         return Ok(());

@@ -1,6 +1,7 @@
 //! The command line.
 
 use clap::{Parser, ValueEnum};
+use forest_foliage::Wind;
 use forest_raster::Light;
 use forest_views::Lookup;
 use forest_volume::Blending;
@@ -19,7 +20,7 @@ pub(crate) struct Args {
     /// Draw one picture, without a window.
     #[arg(long, requires = "output")]
     pub(crate) headless: bool,
-    /// PNG to write.
+    /// PNG to write, or the folder of a --sequence.
     #[arg(short, long, value_name = "PNG", requires = "headless")]
     pub(crate) output: Option<PathBuf>,
     /// Width and height in pixels.
@@ -38,7 +39,8 @@ pub(crate) struct Args {
     /// Parallel camera, as that of `forest-bake draw`; without a window.
     #[arg(long, conflicts_with = "distance", requires = "headless")]
     pub(crate) parallel: bool,
-    /// What to draw; default: auto if the pack has a measured table, else points, views or a volume.
+    /// What to draw; default: auto if the pack has a measured table, else points, views, a
+    /// volume or foliage.
     #[arg(long = "as", value_enum, value_name = "WHAT")]
     pub(crate) what: Option<Representation>,
     /// s_m, smallest projected area of a point in square pixels; default: 1, of scenes 4.
@@ -66,13 +68,14 @@ pub(crate) struct Args {
     /// How views are looked up.
     #[arg(long, value_enum, default_value = "depth")]
     pub(crate) lookup: LookupArg,
-    /// Level of a volume, 0 is the root. Default: by --texel.
+    /// Level of a volume, 0 is the root, or of foliage, 0 is the finest. Default: by --texel.
     #[arg(long, value_name = "N")]
     pub(crate) level: Option<u32>,
     /// How the billboards of a volume's two nearest cameras make one.
     #[arg(long, value_enum, default_value = "shares")]
     pub(crate) blend: BlendArg,
-    /// Largest width of a texel in pixels: what chooses the level of views, and cells of a volume.
+    /// Largest width of a texel in pixels: what chooses the level of views and foliage, and cells of a
+    /// volume.
     #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive)]
     pub(crate) texel: f64,
     /// auto: the cheapest level of all representations whose FLIP error is at most this in all
@@ -83,6 +86,17 @@ pub(crate) struct Args {
     /// that asks for.
     #[arg(long, value_name = "N", conflicts_with = "error", value_parser = positive)]
     pub(crate) fps: Option<f64>,
+    /// Wind: its strength (0 calm, 1 a gale), or STRENGTH,SECONDS at a moment. Default: 0, of sequences
+    /// 0.6.
+    #[arg(long, value_name = "WIND")]
+    pub(crate) wind: Option<Wind>,
+    /// Draw pictures over so many seconds of wind into the folder --output, with an animated preview.
+    #[arg(long, value_name = "SECONDS", requires = "headless", value_parser = positive)]
+    #[arg(conflicts_with_all = ["truth", "fps"])]
+    pub(crate) sequence: Option<f64>,
+    /// Pictures a second of --sequence.
+    #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
+    pub(crate) rate: u16,
     /// Light, without shadows.
     #[arg(long, value_enum, default_value = "sun")]
     pub(crate) light: LightArg,
@@ -135,6 +149,8 @@ pub(crate) enum Representation {
     Views,
     /// Billboards of an octree, in the light of their photographs.
     Volume,
+    /// Cards of leaves, sheets of twigs, tubes of branches; bent by the wind.
+    Foliage,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

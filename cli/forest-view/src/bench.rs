@@ -154,7 +154,7 @@ pub(crate) fn run(args: &Args, gpu: &Gpu, pack: &Pack) -> Result<()> {
         let all = candidates(&model, &camera, &costs);
         now = settings.what(&model, &camera, &all, now.as_ref());
         let layers = [Layer::whole(now.context("nothing was measured")?)];
-        let frame = Frame { camera, light: settings.light, layers: &layers };
+        let frame = Frame { camera, light: settings.light, wind: settings.wind, layers: &layers };
         let drawn = renderer.render(gpu, &mut model, &target, &frame, timer.as_ref())?;
         gpu.finish()?;
         let frame_ms = start.elapsed().as_secs_f64() * 1e3;

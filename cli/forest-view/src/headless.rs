@@ -3,6 +3,7 @@
 use crate::args::Args;
 use crate::orbit::Orbit;
 use crate::output;
+use crate::sequence::Sequence;
 use crate::settings::{Settings, check};
 use crate::truth::Truth;
 use anyhow::{Context, Result};
@@ -33,7 +34,7 @@ pub(crate) fn run(args: &Args, gpu: &Gpu, pack: &Pack, angles: [f64; 2]) -> Resu
     let all = candidates(&model, &camera, &costs);
     let what = settings.what(&model, &camera, &all, None).context("nothing was measured")?;
     let layers = [Layer::whole(what)];
-    let frame = Frame { camera, light: settings.light, layers: &layers };
+    let frame = Frame { camera, light: settings.light, wind: settings.wind, layers: &layers };
     if let (What::Points(thresholds), Some(points), false) = (&what, model.points(), args.quiet)
         && points.is_beyond(&camera, thresholds)
     {
@@ -41,6 +42,20 @@ pub(crate) fn run(args: &Args, gpu: &Gpu, pack: &Pack, angles: [f64; 2]) -> Resu
         eprintln!(
             "warning: {name}: pruned; has no points of {finest} px² here, the finest are drawn"
         );
+    }
+    if let Some(seconds) = args.sequence {
+        let (mut sequence, winds) = Sequence::new(args, seconds, output)?;
+        for wind in winds {
+            renderer.render(gpu, &mut model, &target, &Frame { wind, ..frame.clone() }, None)?;
+            let look = Look { alpha: args.alpha, ..Look::default() };
+            let pixels = read_picture(gpu, &target, &look, None)?;
+            sequence.add(args.size, &pixels, args.alpha)?;
+        }
+        let written = sequence.finish()?;
+        if !args.quiet {
+            eprintln!("{}: {written}", gpu.name());
+        }
+        return Ok(());
     }
     let drawn = renderer.render(gpu, &mut model, &target, &frame, None)?;
     gpu.finish()?;

@@ -5,6 +5,7 @@ use crate::output;
 use crate::settings::Settings;
 use egui::emath::Numeric;
 use egui::{Color32, Context, Grid, Pos2, Rect, Sense, Slider, SliderClamping, Stroke, Ui, Vec2};
+use forest_foliage::wind::MOST_STRENGTH;
 use forest_gpu::{Candidate, Drawn, Goal, Model, What};
 use forest_raster::{Light, Sun};
 use forest_views::Lookup;
@@ -134,6 +135,7 @@ fn controls(ui: &mut Ui, settings: &mut Settings, model: &Model) {
             (Representation::Points, "Points", model.points().is_some()),
             (Representation::Views, "Views", model.views().is_some()),
             (Representation::Volume, "Volume", model.volume().is_some()),
+            (Representation::Foliage, "Foliage", model.foliage().is_some()),
         ];
         for (what, name, _) in there.into_iter().filter(|t| t.2) {
             ui.radio_value(&mut settings.representation, what, name);
@@ -157,25 +159,37 @@ fn controls(ui: &mut Ui, settings: &mut Settings, model: &Model) {
             });
             texel(ui, &mut settings.texel);
         }
+        Representation::Foliage => {
+            let coarsest = model.foliage().map_or(0, |f| f.header.levels.len() as u32 - 1);
+            level(ui, settings, coarsest, 0);
+        }
         Representation::Volume => {
             let finest = model.volume().map_or(0, |v| v.header.levels.len() as u32 - 1);
-            let mut by_texel = settings.level.is_none();
-            ui.checkbox(&mut by_texel, "Levels by the width of texels");
-            settings.level = match (by_texel, settings.level) {
-                (true, _) => None,
-                (false, level) => Some(level.unwrap_or(finest)),
-            };
-            match &mut settings.level {
-                Some(level) => _ = ui.add(slider(level, 0..=finest).text("level")),
-                None => texel(ui, &mut settings.texel),
-            }
+            level(ui, settings, finest, finest);
             let mut over = settings.blending == Blending::Over;
             ui.checkbox(&mut over, "One camera over the other");
             settings.blending = if over { Blending::Over } else { Blending::Shares };
         }
     }
+    if model.foliage().is_some() {
+        ui.add(slider(&mut settings.wind.strength, 0.0..=MOST_STRENGTH).text("wind"));
+    }
     light(ui, &mut settings.light);
     ui.add(slider(&mut settings.side, 1..=4).text("samples a side of a pixel"));
+}
+
+/// A level, `usual` at first, or the width of texels that chooses one.
+fn level(ui: &mut Ui, settings: &mut Settings, last: u32, usual: u32) {
+    let mut by_texel = settings.level.is_none();
+    ui.checkbox(&mut by_texel, "Levels by the width of texels");
+    settings.level = match (by_texel, settings.level) {
+        (true, _) => None,
+        (false, level) => Some(level.unwrap_or(usual).min(last)),
+    };
+    match &mut settings.level {
+        Some(level) => _ = ui.add(slider(level, 0..=last).text("level")),
+        None => texel(ui, &mut settings.texel),
+    }
 }
 
 /// A slider that leaves a value beyond its range as it is, until it is moved.
@@ -221,7 +235,7 @@ fn help(ui: &mut Ui) {
         ("wheel", "nearer, farther"),
         ("W A S D, Q E", "fly"),
         ("F", "show all of the tree"),
-        ("0 1 2 3", "auto, points, views, volume"),
+        ("0 1 2 3 4", "auto, points, views, volume, foliage"),
         ("[ ]", "coarser, finer"),
         ("space", "triangles, as in the source"),
         ("V", "next look-up of views"),

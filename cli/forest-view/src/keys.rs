@@ -45,6 +45,7 @@ pub(crate) fn command(code: KeyCode) -> Option<Command> {
         KeyCode::Digit1 => show(Representation::Points),
         KeyCode::Digit2 => show(Representation::Views),
         KeyCode::Digit3 => show(Representation::Volume),
+        KeyCode::Digit4 => show(Representation::Foliage),
         KeyCode::BracketLeft => Some(Command::Change(Change::Coarser)),
         KeyCode::BracketRight => Some(Command::Change(Change::Finer)),
         KeyCode::Space => Some(Command::Change(Change::Source)),
@@ -63,6 +64,7 @@ pub(crate) fn apply(change: Change, settings: &mut Settings, model: &Model) {
                 Representation::Points => model.points().is_some(),
                 Representation::Views => model.views().is_some(),
                 Representation::Volume => model.volume().is_some(),
+                Representation::Foliage => model.foliage().is_some(),
             };
             if there {
                 settings.representation = what;
@@ -98,6 +100,11 @@ fn step(settings: &mut Settings, model: &Model, factor: f64) {
         (Representation::Volume, Some(level), Some(volume)) => {
             let finest = volume.header.levels.len() as u32 - 1;
             *level = if factor > 1.0 { level.saturating_sub(1) } else { (*level + 1).min(finest) };
+        }
+        (Representation::Foliage, Some(level), _) => {
+            let coarsest = model.foliage().map_or(0, |f| f.header.levels.len() as u32 - 1);
+            *level =
+                if factor > 1.0 { (*level + 1).min(coarsest) } else { level.saturating_sub(1) };
         }
         _ => settings.texel = (settings.texel * factor).clamp(0.25, 64.0),
     }

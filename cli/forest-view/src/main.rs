@@ -9,6 +9,7 @@ mod keys;
 mod orbit;
 mod output;
 mod scene;
+mod sequence;
 mod session;
 mod settings;
 mod surface;

@@ -34,6 +34,7 @@ pub(crate) fn level(what: &What) -> String {
         What::Points(t) if t.largest.0 <= 0.0 => "triangles".into(),
         What::Points(t) => format!("points, s_m {:.3} px², s_M {:.3} px²", t.finest.0, t.largest.0),
         What::Views(level, lookup) => format!("views, level {level}, {}", lookup.name()),
+        What::Foliage(level) => format!("foliage, level {level}"),
         What::Volume(Detail::Level(level), _) => format!("volume, level {level}"),
         What::Volume(Detail::Planes { texel, .. }, _) => format!("volume, texels of {texel} px"),
     }

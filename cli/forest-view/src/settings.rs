@@ -2,6 +2,7 @@
 
 use crate::args::{Args, Representation};
 use anyhow::Result;
+use forest_foliage::Wind;
 use forest_gpu::{Candidate, Goal, Model, What};
 use forest_points::{PixelArea, Thresholds};
 use forest_raster::Light;
@@ -21,11 +22,12 @@ pub(crate) struct Settings {
     pub(crate) ratio: f64,
     pub(crate) bias: f64,
     pub(crate) lookup: Lookup,
-    /// Of a volume; by the width of texels without.
+    /// Of a volume or of foliage; by the width of texels without.
     pub(crate) level: Option<u32>,
     pub(crate) blending: Blending,
     pub(crate) texel: f64,
     pub(crate) goal: Goal,
+    pub(crate) wind: Wind,
     pub(crate) light: Light,
     pub(crate) side: u32,
 }
@@ -46,6 +48,7 @@ impl Settings {
             goal: args
                 .fps
                 .map_or(Goal::Error(args.error.unwrap_or(forest_gpu::JUST_NOTICEABLE)), Goal::Rate),
+            wind: args.wind.unwrap_or_default(),
             light: args.light.light(args.self_shadow),
             side: args.samples,
         }
@@ -73,6 +76,10 @@ impl Settings {
                 What::Views(chosen.level, self.lookup)
             }),
             Representation::Volume => Some(What::Volume(self.detail(), self.blending)),
+            Representation::Foliage => model.foliage().map(|foliage| {
+                let chosen = self.level.map(|l| l as usize);
+                What::Foliage(chosen.unwrap_or_else(|| foliage.select(camera, self.texel)))
+            }),
         }
     }
 
@@ -102,11 +109,12 @@ pub(crate) fn usual(model: &Model) -> Representation {
 
 /// The first representation that the pack has.
 fn there(model: &Model) -> Representation {
-    match (model.points(), model.views()) {
-        (Some(_), _) => Representation::Points,
-        (None, Some(_)) => Representation::Views,
-        (None, None) => Representation::Volume,
-    }
+    let all = [
+        (model.points().is_some(), Representation::Points),
+        (model.views().is_some(), Representation::Views),
+        (model.volume().is_some(), Representation::Volume),
+    ];
+    all.into_iter().find(|(there, _)| *there).map_or(Representation::Foliage, |(_, what)| what)
 }
 
 /// Whether the pack has what was asked for.
@@ -121,8 +129,10 @@ pub(crate) fn check(settings: &Settings, model: &Model) -> Result<()> {
         Representation::Points => What::Points(settings.thresholds()),
         Representation::Views => What::Views(0, settings.lookup),
         Representation::Volume => What::Volume(settings.detail(), settings.blending),
+        Representation::Foliage => What::Foliage(settings.level.unwrap_or(0) as usize),
     };
-    if let (Some(level), Some(volume)) = (settings.level, model.volume()) {
+    let is_volume = settings.representation == Representation::Volume;
+    if let (Some(level), Some(volume), true) = (settings.level, model.volume(), is_volume) {
         let finest = volume.header.levels.len() as u32 - 1;
         if level > finest {
             let pack = model.pack().path().display();

@@ -296,6 +296,7 @@ impl Viewer {
             let path = self.session.path().to_path_buf();
             self.open_pack(&path);
         }
+        self.settings.wind.time += passed;
         self.orbit.fly(self.held.step(f64::from(passed.min(0.1))));
         self.fit_target()?;
         let camera = self.orbit.camera(self.target.size());
@@ -325,7 +326,12 @@ impl Viewer {
         let fader = self.fader.get_or_insert(Fader::new(wanted, FADE));
         fader.advance(wanted, passed);
         let (layers, count) = fader.layers();
-        let frame = Frame { camera: *camera, light: self.settings.light, layers: &layers[..count] };
+        let frame = Frame {
+            camera: *camera,
+            light: self.settings.light,
+            wind: self.settings.wind,
+            layers: &layers[..count],
+        };
         let Self { gpu, renderer, target, .. } = self;
         self.drawn = self.session.with_model(|m| renderer.render(gpu, m, target, &frame, None))?;
         Ok(Some(wanted))

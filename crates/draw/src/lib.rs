@@ -4,7 +4,7 @@
 //! [`forest_raster`], with the same samples as the ground truth: spheroids as ellipses, triangles
 //! with their textures and alpha rule, opacity by the hash rule, no sorting and no blending.
 //! [`ViewsLevel`] draws a level of views the same way, sample by sample; [`PointsSubject`] lets views
-//! be captured from points. [`VolumeScene`] sorts and blends: that is what its billboards are made for.
+//! be captured from points. [`FoliageScene`] draws the meshes of foliage, bent by the wind. [`VolumeScene`] sorts and blends: that is what its billboards are made for.
 //!
 //! ```
 //! use forest_draw::draw_points;
@@ -35,11 +35,13 @@
 //! assert!((picture.mean_coverage() - 0.125).abs() < 0.01);
 //! ```
 
+mod foliage;
 mod points;
 mod subject;
 mod views;
 mod volume;
 
+pub use foliage::FoliageScene;
 pub use points::{Drawn, PointsFrame, draw_points, point_ellipses, read_surfaces};
 pub use subject::PointsSubject;
 pub use views::{ViewsDrawn, ViewsLevel};

@@ -2,7 +2,7 @@
 
 use crate::contender::{Contender, Look, Way};
 use crate::error::EvalError;
-use forest_draw::{ViewsLevel, VolumeScene};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene};
 use forest_pack::{Pack, PackWriter};
 use forest_points::{BakeOptions, GridChoice, Order, PointsBlock, RadiusRule, SurfelSize, bake};
 use forest_raster::Surfaces;
@@ -183,6 +183,16 @@ pub fn volume_contenders<'a>(scene: Option<&'a VolumeScene<'a>>) -> Vec<Contende
         name: "volume",
         what: "the volume, one level of it, two cameras blended",
         way: Way::Volume { scene, only: None },
+    };
+    scene.map(named).into_iter().collect()
+}
+
+/// A pack's foliage, level by level.
+pub fn foliage_contenders<'a>(scene: Option<&'a FoliageScene<'a>>) -> Vec<Contender<'a>> {
+    let named = |scene| Contender {
+        name: "foliage",
+        what: "the foliage at rest, one level of it: tubes, sheets and cards",
+        way: Way::Foliage { scene },
     };
     scene.map(named).into_iter().collect()
 }

@@ -1,6 +1,7 @@
 //! What is judged: the pack, and other ways to draw the same tree with fewer primitives.
 
-use forest_draw::{ViewsLevel, VolumeScene, point_ellipses};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, point_ellipses};
+use forest_foliage::Wind;
 use forest_points::{Cut, PixelArea, PointsBlock, Thresholds, select_into};
 use forest_raster::{DisplayList, Ellipse, Picture, Style, Surfaces, draw, rasterize};
 use forest_soup::{Camera, TriangleSoup};
@@ -37,6 +38,8 @@ pub(crate) enum Way<'a> {
     Views { levels: &'a [ViewsLevel<'a>], lookup: Lookup },
     /// A volume, level by level.
     Volume { scene: &'a VolumeScene<'a>, only: Option<u32> },
+    /// Foliage at rest, level by level.
+    Foliage { scene: &'a FoliageScene<'a> },
     /// Levels of a mesh, finest first, with the share of triangles that each was asked for.
     Meshes { levels: &'a [(f64, Cow<'a, TriangleSoup>)], surfaces: &'a Surfaces },
 }
@@ -71,6 +74,11 @@ pub enum Knob {
         texels: u32,
         /// How views are looked up.
         lookup: ViewsLookup,
+    },
+    /// A level of foliage.
+    Foliage {
+        /// Its number; 0 is the finest.
+        level: u32,
     },
     /// A level of a volume.
     Volume {
@@ -122,7 +130,9 @@ impl Knob {
                 largest: PixelArea(s_max),
                 depth_bias: PixelArea(k),
             }),
-            Knob::Share(_) | Knob::Views { .. } | Knob::Volume { .. } => None,
+            Knob::Share(_) | Knob::Views { .. } | Knob::Volume { .. } | Knob::Foliage { .. } => {
+                None
+            }
         }
     }
 }
@@ -174,6 +184,10 @@ impl Contender<'_> {
                 let levels = only.map_or(levels, |level| level..level + 1);
                 levels.rev().map(|level| Knob::Volume { level }).collect()
             }
+            Way::Foliage { scene } => {
+                let levels = 0..scene.block().header.levels.len() as u32;
+                levels.map(|level| Knob::Foliage { level }).collect()
+            }
             Way::RandomPoints { .. } => shares.iter().map(|&s| Knob::Share(s)).collect(),
             Way::Meshes { levels, .. } => levels.iter().map(|l| Knob::Share(l.0)).collect(),
         }
@@ -214,6 +228,12 @@ impl Contender<'_> {
                 let detail = Detail::Level(level);
                 let (picture, drawn) = scene.draw(camera, detail, Blending::Shares, style.sampling);
                 let (primitives, bytes) = (drawn.billboards as f64, drawn.bytes);
+                (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
+            }
+            (Way::Foliage { scene }, Knob::Foliage { level }) => {
+                let level = level as usize;
+                let picture = scene.draw(camera, level, &Wind::default(), style);
+                let (primitives, bytes) = scene.cost(level);
                 (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
             }
             _ => unreachable!("a contender is drawn with its own knobs"),

@@ -39,7 +39,7 @@ pub fn measures(sweep: &Sweep, plan: &Plan) -> Measures {
 pub(crate) fn is_own(name: &str) -> bool {
     ["pack", "triangles", "bias-1/4", "bias-1"].contains(&name)
         || name.starts_with("views")
-        || name == "volume"
+        || ["volume", "foliage"].contains(&name)
 }
 
 fn measure(s: &Summary, band: Band, plan: &Plan) -> Option<Measure> {
@@ -49,6 +49,7 @@ fn measure(s: &Summary, band: Band, plan: &Plan) -> Option<Measure> {
             (kind::VIEWS_HEADER, [texels as f32, f32::from(lookup as u8), 0.0])
         }
         Knob::Volume { level } => (kind::VOLUME_HEADER, [level as f32, 0.0, 0.0]),
+        Knob::Foliage { level } => (kind::FOLIAGE_HEADER, [level as f32, 0.0, 0.0]),
         Knob::Share(_) => return None,
     };
     Some(Measure {

@@ -60,7 +60,9 @@ pub mod report;
 mod sweep;
 mod truth;
 
-pub use baselines::{Baselines, own_contenders, views_contenders, volume_contenders};
+pub use baselines::{
+    Baselines, foliage_contenders, own_contenders, views_contenders, volume_contenders,
+};
 pub use calibrate::{Calibrated, calibrate};
 pub use contender::{Contender, Cost, Knob, ViewsLookup};
 pub use embed::measures;

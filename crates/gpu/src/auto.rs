@@ -40,11 +40,13 @@ pub fn candidates(model: &Model, camera: &Camera, costs: &Costs) -> Vec<Candidat
     let Some(table) = model.measures() else { return Vec::new() };
     let error = ErrorKind::Flip;
     let needs = [
+        model.foliage().map(|b| b.need(camera, error)),
         model.points().map(|b| b.need(camera, error)),
         model.views().map(|b| b.need(camera, error)),
         model.volume().map(|b| b.need(camera, error)),
     ];
-    let representations: [fn(&Model, &Choice) -> Option<What>; 3] = [
+    let representations: [fn(&Model, &Choice) -> Option<What>; 4] = [
+        |_, c| Some(What::Foliage(c.level[0] as usize)),
         |_, c| Some(What::Points(Thresholds::of_level(c.level))),
         |model, c| views_level(model.views()?, c.level),
         |_, c| Some(What::Volume(Detail::Level(c.level[0] as u32), Blending::Shares)),

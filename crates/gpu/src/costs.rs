@@ -6,6 +6,7 @@ use crate::frame::{Frame, Layer, What};
 use crate::model::Model;
 use crate::renderer::Renderer;
 use crate::target::Target;
+use forest_foliage::Wind;
 use forest_points::{PixelArea, Thresholds};
 use forest_raster::Light;
 use forest_soup::Camera;
@@ -24,6 +25,8 @@ pub struct Costs {
     views: [f64; 3],
     /// Of a picture of a volume, and of each billboard in it.
     volume: [f64; 2],
+    /// Of a picture of foliage, and of each triangle in it.
+    foliage: [f64; 2],
 }
 
 /// Pictures that a cost is measured by, after one that warms up.
@@ -46,7 +49,8 @@ impl Costs {
         let time = |model: &mut Model, what: What| -> Result<[f64; 2], GpuError> {
             let layers = [Layer::whole(what)];
             let light = Light::Albedo;
-            let frame = Frame { camera: *camera, light, layers: &layers };
+            let wind = Wind::default();
+            let frame = Frame { camera: *camera, light, wind, layers: &layers };
             let (mut least, mut primitives) = (f64::INFINITY, 0);
             for round in 0..=ROUNDS {
                 let start = Instant::now();
@@ -78,6 +82,10 @@ impl Costs {
             let coarse = time(model, level(finest.saturating_sub(3)))?;
             costs.volume = line(coarse, time(model, level(finest.saturating_sub(1)))?);
         }
+        if let Some(coarsest) = model.foliage().map(|b| b.header.levels.len() - 1) {
+            let coarse = time(model, What::Foliage(coarsest))?;
+            costs.foliage = line(coarse, time(model, What::Foliage(0))?);
+        }
         Ok(costs)
     }
 
@@ -89,6 +97,7 @@ impl Costs {
             What::Points(_) => on(self.points),
             // A cell shows the billboards of two cameras.
             What::Volume(..) => on(self.volume) - 0.5 * self.volume[1] * primitives,
+            What::Foliage(_) => on(self.foliage),
             What::Views(_, lookup) => {
                 let each = Lookup::ALL.iter().zip(self.views).find(|(l, _)| **l == lookup);
                 let pixels = model.views().map_or(0.0, |b| pixels(b, camera));

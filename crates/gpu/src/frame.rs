@@ -1,6 +1,7 @@
 //! What a picture is made of: the camera, the light, and the layers.
 
 use bytemuck::{Pod, Zeroable};
+use forest_foliage::{Sway, Wind};
 use forest_points::Thresholds;
 use forest_raster::Light;
 use forest_soup::{Camera, Projection};
@@ -15,6 +16,8 @@ pub struct Frame<'a> {
     pub camera: Camera,
     /// The light, without shadows. Volumes are in the light of their photographs.
     pub light: Light,
+    /// The wind that foliage stands in.
+    pub wind: Wind,
     /// What is drawn; layers with fades share the samples of the picture.
     pub layers: &'a [Layer],
 }
@@ -39,6 +42,8 @@ pub enum What {
     Views(usize, Lookup),
     /// A volume.
     Volume(Detail, Blending),
+    /// Foliage of a level: an index into the header's.
+    Foliage(usize),
 }
 
 impl Layer {
@@ -79,6 +84,9 @@ pub(crate) struct FrameUniform {
     darkest: f32,
     middle: [f32; 3],
     half_diagonal: f32,
+    lean: [f32; 2],
+    foot: f32,
+    zero: f32,
 }
 
 impl FrameUniform {
@@ -121,6 +129,12 @@ impl FrameUniform {
 }
 
 impl FrameUniform {
+    /// Of a block that leans before `camera`; its foot is in the world.
+    pub(crate) fn with_sway(self, sway: &Sway, camera: &Camera) -> Self {
+        let foot = (f64::from(sway.foot) - camera.eye.y) as f32;
+        Self { lean: sway.lean.to_array(), foot, ..self }
+    }
+
     /// With another nearest distance.
     pub(crate) fn with_near(self, near: f64) -> Self {
         Self { near: near as f32, ..self }

@@ -9,6 +9,7 @@
 //!   32-bit ones in two runs); large ones as quads; beyond, the pack's triangles with their textures.
 //! * **Views**: a quad; each sample a ray through one to three views, through their depth if wanted.
 //! * **Volume**: billboards of two cameras from back to front, codes decompressed by a look-up.
+//! * **Foliage**: a level's mesh, bent by the wind.
 //! * **[`candidates`], [`Goal`], [`Fader`]**: which level of which representation, by the table that was
 //!   measured when the pack was baked and by what levels cost here ([`Costs`]); changes fade on
 //!   complementary samples.
@@ -18,6 +19,7 @@
 //! buffer is made while frames are drawn, and sizes are checked against the device's limits before.
 //!
 //! ```no_run
+//! use forest_foliage::Wind;
 //! use forest_gpu::{Frame, Gpu, Layer, Look, Model, Options, Renderer, What, read_picture};
 //! use forest_points::Thresholds;
 //! use forest_raster::Light;
@@ -31,7 +33,7 @@
 //! let target = renderer.target(&gpu, [640, 480], 2)?;
 //! let camera = Camera::around(model.bounds(), [30.0, 10.0], Some(3.0), [640, 480]);
 //! let layers = [Layer::whole(What::Points(Thresholds::default()))];
-//! let frame = Frame { camera, light: Light::MORNING, layers: &layers };
+//! let frame = Frame { camera, light: Light::MORNING, wind: Wind::default(), layers: &layers };
 //! renderer.render(&gpu, &mut model, &target, &frame, None)?;
 //! let pixels = read_picture(&gpu, &target, &Look::default(), None)?;
 //! assert_eq!(pixels.len(), 640 * 480);
@@ -44,8 +46,10 @@ mod bind;
 mod costs;
 mod device;
 mod error;
+mod foliage;
 mod frame;
 mod landscape;
+mod materials;
 mod model;
 mod pipeline;
 mod points;

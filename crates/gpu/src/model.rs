@@ -2,14 +2,18 @@
 
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::foliage::FoliageModel;
 use crate::frame::{Layer, Stage, What};
 use crate::points::PointsModel;
 use crate::renderer::Renderer;
 use crate::views::ViewsModel;
 use crate::volume::VolumeModel;
+use forest_foliage::sway::USUAL_LIMBER;
+use forest_foliage::{FoliageBlock, Posed, Sway, Wind};
 use forest_pack::measures::{Light, Measure, Measures};
 use forest_pack::{Pack, kind};
 use forest_points::PointsBlock;
+use forest_soup::Camera;
 use forest_views::ViewsBlock;
 use forest_volume::VolumeBlock;
 use glam::DVec3;
@@ -21,6 +25,7 @@ pub struct Model<'p> {
     pub(crate) points: Option<PointsModel<'p>>,
     pub(crate) views: Option<ViewsModel<'p>>,
     pub(crate) volume: Option<VolumeModel<'p>>,
+    pub(crate) foliage: Option<FoliageModel<'p>>,
     measures: Option<Measures>,
     stage: Stage,
     bounds: [DVec3; 2],
@@ -43,6 +48,9 @@ impl<'p> Model<'p> {
         let volume = there(VolumeBlock::is_in(pack))
             .map(|()| VolumeModel::load(gpu, &renderer.volume, pack))
             .transpose()?;
+        let foliage = there(FoliageBlock::is_in(pack))
+            .map(|()| FoliageModel::load(gpu, &renderer.foliage, pack))
+            .transpose()?;
         let measures = Measures::read(pack)?;
         gpu.finish()?;
         let (stage, bounds) = if let Some(p) = &points {
@@ -53,11 +61,13 @@ impl<'p> Model<'p> {
             (v.stage(), bounds)
         } else if let Some(v) = &volume {
             (v.stage(), v.block.header.bounds.map(DVec3::from_array))
+        } else if let Some(f) = &foliage {
+            (f.stage(), f.block.bounds())
         } else {
             let pack = pack.path().display().to_string();
             return Err(GpuError::Nothing { pack });
         };
-        Ok(Self { pack, points, views, volume, measures, stage, bounds })
+        Ok(Self { pack, points, views, volume, foliage, measures, stage, bounds })
     }
 
     /// The pack.
@@ -85,6 +95,11 @@ impl<'p> Model<'p> {
         self.volume.as_ref().map(|v| &v.block)
     }
 
+    /// The foliage, if the pack has it.
+    pub fn foliage(&self) -> Option<&FoliageBlock<'p>> {
+        self.foliage.as_ref().map(|f| &f.block)
+    }
+
     /// The measured table, if the pack has one.
     pub fn measures(&self) -> Option<&Measures> {
         self.measures.as_ref()
@@ -97,6 +112,7 @@ impl<'p> Model<'p> {
             kind::POINTS_HEADER => self.points.is_some(),
             kind::VIEWS_HEADER => self.views.is_some(),
             kind::VOLUME_HEADER => self.volume.is_some(),
+            kind::FOLIAGE_HEADER => self.foliage.is_some(),
             _ => false,
         };
         let counts = |r: &Measure| r.light == Light::Albedo && here(r.representation);
@@ -117,10 +133,31 @@ impl<'p> Model<'p> {
                 }
                 Some(_) => None,
             },
+            What::Foliage(level) => match &self.foliage {
+                None => Some("foliage".into()),
+                Some(f) if *level >= f.block.header.levels.len() => {
+                    Some(format!("level {level} of foliage"))
+                }
+                Some(_) => None,
+            },
             What::Volume(..) => self.volume.is_none().then(|| "volume".into()),
         };
         let pack = self.pack.path().display().to_string();
         missing.map_or(Ok(()), |what| Err(GpuError::Missing { pack, what }))
+    }
+
+    /// How the whole tree leans in `wind`, its foot in the world: the mean of what its branches do, where
+    /// they are known.
+    pub(crate) fn sway(&self, wind: &Wind, camera: &Camera) -> Sway {
+        if wind.strength <= 0.0 {
+            return Sway::default();
+        }
+        let Some(block) = self.foliage() else {
+            let [min, max] = self.bounds.map(|p| p.y as f32);
+            return Sway::new(USUAL_LIMBER, min, max - min, wind, 0.0);
+        };
+        let own = Sway::of(block, &Posed::new(block, wind, 0.0, camera.eye));
+        Sway { foot: (f64::from(own.foot) + block.origin().y) as f32, ..own }
     }
 
     pub(crate) fn stage(&self) -> &Stage {

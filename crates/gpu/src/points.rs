@@ -10,6 +10,7 @@ use crate::target::{Target, TargetLayouts};
 use crate::triangles::TrianglesModel;
 use crate::{CHUNK, MOST_LAYERS};
 use bytemuck::{Pod, Zeroable};
+use forest_foliage::Sway;
 use forest_pack::Pack;
 use forest_points::{
     CellRecord, Cut, Order, PixelArea, PointRecord, PointsBlock, SizeCode, Thresholds,
@@ -51,7 +52,8 @@ pub(crate) struct CellUniform {
     mask: u32,
     clump: f32,
     cut: f32,
-    zero: [f32; 3],
+    foot: f32,
+    lean: [f32; 2],
 }
 
 /// `Chunk` of chunk.wgsl.
@@ -152,6 +154,7 @@ impl<'p> PointsModel<'p> {
         &mut self,
         gpu: &Gpu,
         camera: &Camera,
+        sway: &Sway,
         layers: impl Iterator<Item = (Thresholds, [f32; 2])>,
     ) {
         let (block, frame) = (&self.block, &mut self.frame);
@@ -176,7 +179,7 @@ impl<'p> PointsModel<'p> {
                     fade,
                     first_point: block.point_offset(cut.cell),
                     first_triangle: block.triangle_offset(cut.cell),
-                    ..cell_uniform(block, record, camera)
+                    ..cell_uniform(block, record, camera, sway)
                 });
                 for first in cut.points.clone().step_by(CHUNK as usize) {
                     let count = CHUNK.min(cut.points.end - first);
@@ -224,7 +227,12 @@ fn padded(n: usize) -> usize {
     n.next_multiple_of(MOST_GROUPS.min(n.max(1)))
 }
 
-fn cell_uniform(block: &PointsBlock, cell: &CellRecord, camera: &Camera) -> CellUniform {
+fn cell_uniform(
+    block: &PointsBlock,
+    cell: &CellRecord,
+    camera: &Camera,
+    sway: &Sway,
+) -> CellUniform {
     // In f64 down to the eye: blocks far from the world's zero lose nothing.
     let zero = block.to_world(block.position(cell, [0; 3])) - camera.eye;
     CellUniform {
@@ -241,7 +249,8 @@ fn cell_uniform(block: &PointsBlock, cell: &CellRecord, camera: &Camera) -> Cell
         mask: 0,
         clump: 0.0,
         cut: f32::NEG_INFINITY,
-        zero: [0.0; 3],
+        foot: (f64::from(sway.foot) - camera.eye.y) as f32,
+        lean: sway.lean.to_array(),
     }
 }
 

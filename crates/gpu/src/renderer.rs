@@ -4,6 +4,7 @@ use crate::MOST_LAYERS;
 use crate::bind::{self, Kind};
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::foliage::FoliagePass;
 use crate::frame::{Frame, FrameUniform, What, supersampled};
 use crate::model::Model;
 use crate::points::PointsPass;
@@ -11,6 +12,7 @@ use crate::target::{Target, TargetLayouts};
 use crate::timer::Timer;
 use crate::views::ViewsPass;
 use crate::volume::VolumePass;
+use forest_foliage::Sway;
 use wgpu::{
     BindGroup, Buffer, BufferUsages, Color, CommandEncoder, LoadOp, Operations,
     RenderPassColorAttachment, RenderPassDepthStencilAttachment, RenderPassDescriptor,
@@ -23,6 +25,7 @@ pub struct Renderer {
     pub(crate) points: PointsPass,
     pub(crate) views: ViewsPass,
     pub(crate) volume: VolumePass,
+    pub(crate) foliage: FoliagePass,
     targets: TargetLayouts,
     uniform: Buffer,
     group: BindGroup,
@@ -84,6 +87,7 @@ impl Renderer {
             points: PointsPass::new(gpu, &layout, &targets, options),
             views: ViewsPass::new(gpu, &layout),
             volume: VolumePass::new(gpu, &layout),
+            foliage: FoliagePass::new(gpu, &layout),
             targets,
             uniform,
             group,
@@ -117,9 +121,11 @@ impl Renderer {
     ) -> Result<Drawn, GpuError> {
         model.check_layers(frame.layers)?;
         let samples = supersampled(&frame.camera, target.side);
+        let sway = model.sway(&frame.wind, &frame.camera);
         let uniform = FrameUniform::new(&samples, &frame.light, model.stage());
+        let uniform = uniform.with_sway(&sway, &samples);
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
-        let drawn = prepare(gpu, model, &samples, frame);
+        let drawn = prepare(gpu, model, &samples, frame, &sway);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         if let Some(timer) = timer {
             timer.begin(&mut encoder);
@@ -137,6 +143,7 @@ impl Renderer {
         let points = model.points.as_ref().filter(|_| draws(|w| matches!(w, What::Points(_))));
         let views = model.views.as_ref().filter(|_| draws(|w| matches!(w, What::Views(..))));
         let volume = model.volume.as_ref().filter(|_| draws(|w| matches!(w, What::Volume(..))));
+        let foliage = model.foliage.as_ref().filter(|_| draws(|w| matches!(w, What::Foliage(_))));
         if let Some(points) = points {
             self.points.splat(encoder, &self.group, points, target);
         }
@@ -164,6 +171,9 @@ impl Renderer {
         if let Some(views) = views {
             self.views.draw(&mut pass, views);
         }
+        if let Some(foliage) = foliage {
+            self.foliage.draw(&mut pass, foliage);
+        }
         // Over all that is opaque.
         if let Some(volume) = volume {
             self.volume.draw(&mut pass, volume);
@@ -172,7 +182,13 @@ impl Renderer {
 }
 
 /// Chooses and uploads what the layers draw: levels for pixels, places for samples.
-fn prepare(gpu: &Gpu, model: &mut Model, samples: &forest_soup::Camera, frame: &Frame) -> Drawn {
+fn prepare(
+    gpu: &Gpu,
+    model: &mut Model,
+    samples: &forest_soup::Camera,
+    frame: &Frame,
+    sway: &Sway,
+) -> Drawn {
     let mut drawn = Drawn::default();
     let layers = frame.layers.iter();
     if let Some(model) = &mut model.points {
@@ -181,7 +197,7 @@ fn prepare(gpu: &Gpu, model: &mut Model, samples: &forest_soup::Camera, frame: &
             _ => None,
         });
         if chosen.clone().next().is_some() {
-            model.prepare(gpu, &frame.camera, chosen.take(MOST_LAYERS));
+            model.prepare(gpu, &frame.camera, sway, chosen.take(MOST_LAYERS));
             let took = model.drawn();
             drawn.points += took.points;
             drawn.triangles += took.triangles;
@@ -198,6 +214,18 @@ fn prepare(gpu: &Gpu, model: &mut Model, samples: &forest_soup::Camera, frame: &
             model.prepare(gpu, samples, chosen);
             drawn.views += model.drawn().views;
             drawn.bytes += model.drawn().bytes;
+            drawn.calls += model.calls();
+        }
+    }
+    if let Some(model) = &mut model.foliage {
+        let chosen = layers.clone().filter_map(|l| match l.what {
+            What::Foliage(level) => Some((level, l.fade)),
+            _ => None,
+        });
+        if chosen.clone().next().is_some() {
+            model.prepare(gpu, &frame.camera, &frame.wind, chosen);
+            drawn.triangles += model.triangles();
+            drawn.bytes += model.bytes();
             drawn.calls += model.calls();
         }
     }

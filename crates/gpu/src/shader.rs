@@ -2,6 +2,7 @@
 
 use crate::CHUNK;
 use crate::landscape;
+use forest_foliage::wind::{STEADY, SWINGS};
 use forest_points::{SizeCode, spheroid};
 use forest_views as views;
 use wgpu::{Device, ShaderModule, ShaderModuleDescriptor, ShaderSource};
@@ -17,6 +18,7 @@ const KEEP64: &str = include_str!("wgsl/keep64.wgsl");
 const KEEP32: &str = include_str!("wgsl/keep32.wgsl");
 const LARGE: &str = include_str!("wgsl/points_large.wgsl");
 const TILE: &str = include_str!("wgsl/tile.wgsl");
+const SURFACE: &str = include_str!("wgsl/surface.wgsl");
 const TRIANGLES: &str = include_str!("wgsl/triangles.wgsl");
 
 /// Names the share of samples that fading layers draw, among the uses of the hash rule.
@@ -32,6 +34,7 @@ pub(crate) enum Shader {
     /// Large points, and what the splats found.
     Points,
     Triangles,
+    Foliage,
     Views,
     Volume,
     Present,
@@ -72,7 +75,11 @@ impl Shader {
             }
             Self::Triangles => {
                 let block = include_str!("wgsl/triangles_block.wgsl");
-                &[COMMON, LIT_BLOCK, CELL, TRIANGLES, block]
+                &[COMMON, LIT_BLOCK, CELL, SURFACE, TRIANGLES, block]
+            }
+            Self::Foliage => {
+                let wind = include_str!("wgsl/wind.wgsl");
+                &[COMMON, LIT_BLOCK, SURFACE, wind, include_str!("wgsl/foliage.wgsl")]
             }
             Self::Views => &[COMMON, LIT_BLOCK, TILE, include_str!("wgsl/views.wgsl")],
             Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],
@@ -120,7 +127,7 @@ impl Step {
             }
             Self::Large => &[LIGHT, CELL, POINTS, LARGE],
             Self::Triangles => {
-                &[LIGHT, CELL, TRIANGLES, include_str!("wgsl/landscape/triangles.wgsl")]
+                &[LIGHT, CELL, SURFACE, TRIANGLES, include_str!("wgsl/landscape/triangles.wgsl")]
             }
         };
         [COMMON, &parts.concat()].concat()
@@ -149,11 +156,16 @@ fn constants() -> String {
         ("MOST_DRAWS", 4 * forest_scene::MOST_SPECIES as u32),
         ("COMPASS_AROUND", landscape::COMPASS[0]),
         ("COMPASS_UP", landscape::COMPASS[1]),
+        ("DICTIONARY", forest_foliage::DICTIONARY.into()),
         ("RAW_SIDE", crate::volume::RAW_SIDE),
         ("MOST_LEVELS", crate::volume::MOST_LEVELS as u32),
     ];
     let floats = [
         ("HALF_TURN", std::f64::consts::PI),
+        ("STEADY", STEADY.into()),
+        ("MOST_LEAN", forest_foliage::sway::MOST_LEAN.into()),
+        ("GUST", landscape::GUST),
+        ("OWN_PHASE", landscape::OWN_PHASE),
         ("BUCKETS_PER_OCTAVE", f64::from(landscape::BUCKETS_PER_OCTAVE)),
         ("IMPOSTOR_FADE", forest_scene::IMPOSTOR_FADE),
         ("LEAST_IMPOSTOR", forest_scene::LEAST_IMPOSTOR),
@@ -172,7 +184,8 @@ fn constants() -> String {
         ("BEHIND", views::BEHIND),
         ("LEAST_THROUGH", f64::from(forest_volume::LEAST_THROUGH)),
     ];
-    let mut text = String::new();
+    let swings = SWINGS.map(|[far, fast, shift]| format!("vec3f({far:?}, {fast:?}, {shift:?})"));
+    let mut text = format!("const SWINGS = array<vec3f, 4>({});\n", swings.join(", "));
     for (name, value) in words {
         text += &format!("const {name}: u32 = {value}u;\n");
     }

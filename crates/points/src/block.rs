@@ -61,14 +61,12 @@ impl<'a> PointsBlock<'a> {
     /// What a pack's measured table is to be asked for this block before `camera`: its height in
     /// pixels and the camera's elevation, both at the block's middle, under base colours.
     pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
-        let [min, max] = [self.header.min, self.header.max].map(DVec3::from_array);
-        let middle = self.middle();
-        let distance = (middle - camera.eye).dot(camera.forward).max(f64::MIN_POSITIVE);
-        let height = (max - min).max_element() * self.scale() * camera.pixels_per_unit(distance);
+        let bounds = [self.header.min, self.header.max].map(|p| self.to_world(p.into()));
+        let (height, elevation) = camera.sees(bounds);
         Need {
             representation: kind::POINTS_HEADER,
             pixel_height: height as f32,
-            elevation: Some(camera.to_eye(middle).y.clamp(-1.0, 1.0).asin().to_degrees() as f32),
+            elevation: Some(elevation as f32),
             light: Light::Albedo,
             error,
         }

@@ -105,6 +105,15 @@ impl Camera {
         )
     }
 
+    /// How a box is seen: its longest side in pixels and the eye's elevation in degrees, both at the
+    /// box's middle.
+    pub fn sees(&self, [min, max]: [DVec3; 2]) -> (f64, f64) {
+        let middle = 0.5 * (min + max);
+        let distance = (middle - self.eye).dot(self.forward).max(f64::MIN_POSITIVE);
+        let height = (max - min).max_element() * self.pixels_per_unit(distance);
+        (height, self.to_eye(middle).y.clamp(-1.0, 1.0).asin().to_degrees())
+    }
+
     /// Unit vector from `world` towards the eye (the reverse viewing direction there).
     pub fn to_eye(&self, world: DVec3) -> DVec3 {
         match self.projection {

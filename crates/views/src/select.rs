@@ -94,14 +94,12 @@ impl ViewsBlock<'_> {
     /// What a pack's measured table is to be asked for this block before `camera`, under base
     /// colours.
     pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
-        let distance = (self.center() - camera.eye).dot(camera.forward).max(f64::MIN_POSITIVE);
-        let [min, max] = self.header.bounds;
-        let longest = (0..3).map(|k| max[k] - min[k]).fold(0.0, f64::max);
-        let to_eye = camera.to_eye(self.center());
+        let bounds = self.header.bounds.map(|b| self.center() + DVec3::from_array(b));
+        let (height, elevation) = camera.sees(bounds);
         Need {
             representation: kind::VIEWS_HEADER,
-            pixel_height: (longest * camera.pixels_per_unit(distance)) as f32,
-            elevation: Some(to_eye.y.clamp(-1.0, 1.0).asin().to_degrees() as f32),
+            pixel_height: height as f32,
+            elevation: Some(elevation as f32),
             light: Light::Albedo,
             error,
         }

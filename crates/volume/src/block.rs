@@ -81,14 +81,11 @@ impl<'a> VolumeBlock<'a> {
 
     /// What a pack's measured table is to be asked for this volume before `camera`.
     pub fn need(&self, camera: &Camera, error: ErrorKind) -> Need {
-        let [low, high] = self.header.bounds.map(DVec3::from_array);
-        let middle = 0.5 * (low + high);
-        let distance = (middle - camera.eye).dot(camera.forward).max(f64::MIN_POSITIVE);
-        let height = (high - low).max_element() * camera.pixels_per_unit(distance);
+        let (height, elevation) = camera.sees(self.header.bounds.map(DVec3::from_array));
         Need {
             representation: kind::VOLUME_HEADER,
             pixel_height: height as f32,
-            elevation: Some(camera.to_eye(middle).y.clamp(-1.0, 1.0).asin().to_degrees() as f32),
+            elevation: Some(elevation as f32),
             light: Light::Albedo,
             error,
         }

@@ -51,6 +51,17 @@ pub const VOLUME_ALPHAS: u16 = 69;
 /// The atlas of codewords.
 pub const VOLUME_ATLAS: u16 = 70;
 
+/// Header of the foliage representation (owner: `forest-foliage`).
+pub const FOLIAGE_HEADER: u16 = 80;
+/// Vertices of a level, 40 bytes each; the index is the level's number.
+pub const FOLIAGE_VERTICES: u16 = 81;
+/// Triangles of a level, 12 bytes each.
+pub const FOLIAGE_INDICES: u16 = 82;
+/// The texture dictionary; the index is the resolution's number.
+pub const FOLIAGE_ATLAS: u16 = 83;
+/// Branches as wind moves them, 64 bytes each.
+pub const WIND_BRANCHES: u16 = 96;
+
 /// Name of a kind for people; unknown kinds are named by number.
 pub fn name(kind: u16) -> String {
     match kind {
@@ -78,6 +89,11 @@ pub fn name(kind: u16) -> String {
         VOLUME_COLORS => "volume.colors".into(),
         VOLUME_ALPHAS => "volume.alphas".into(),
         VOLUME_ATLAS => "volume.atlas".into(),
+        FOLIAGE_HEADER => "foliage.header".into(),
+        FOLIAGE_VERTICES => "foliage.vertices".into(),
+        FOLIAGE_INDICES => "foliage.indices".into(),
+        FOLIAGE_ATLAS => "foliage.atlas".into(),
+        WIND_BRANCHES => "wind.branches".into(),
         other => format!("kind-{other}"),
     }
 }

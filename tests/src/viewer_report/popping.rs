@@ -1,6 +1,7 @@
 //! Whether a change of level is seen: pictures from step to step of a camera that moves away.
 
 use anyhow::{Context, Result};
+use forest_foliage::Wind;
 use forest_gpu::{
     Costs, Fader, Frame, Goal, Gpu, JUST_NOTICEABLE, Layer, Model, Options, Renderer, Target, What,
     candidates, read_samples,
@@ -143,7 +144,7 @@ fn draw(
     camera: &Camera,
     layers: &[Layer],
 ) -> Result<Picture> {
-    let frame = Frame { camera: *camera, light: Light::Albedo, layers };
+    let frame = Frame { camera: *camera, light: Light::Albedo, wind: Wind::default(), layers };
     renderer.render(gpu, model, target, &frame, None)?;
     let [width, height] = SIZE.map(|n| n * SIDE);
     let pixels = read_samples(gpu, target)?;
@@ -166,6 +167,7 @@ fn in_words(what: &What) -> String {
         What::Points(t) if t.largest.0 <= 0.0 => "triangles".into(),
         What::Points(t) => format!("points, s_m {} px²", t.finest.0),
         What::Views(level, lookup) => format!("views, level {level}, {}", lookup.name()),
+        What::Foliage(level) => format!("foliage, level {level}"),
         What::Volume(detail, _) => format!("volume, {detail:?}"),
     }
 }

@@ -1,7 +1,8 @@
 //! What pictures cost.
 
 use anyhow::Result;
-use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_foliage::{FoliageBlock, Wind};
 use forest_gpu::{
     Drawn, Frame, Gpu, Layer, Model, Options, Renderer, Target, Timer, What, read_samples,
 };
@@ -102,7 +103,8 @@ fn timed(
 ) -> Result<(Drawn, f64, Option<f64>)> {
     let timer = Timer::new(gpu);
     let layers = [Layer::whole(what)];
-    let frame = Frame { camera: *camera, light: Light::Albedo, layers: &layers };
+    let frame =
+        Frame { camera: *camera, light: Light::Albedo, wind: Wind::default(), layers: &layers };
     let (mut frames, mut device) = (Vec::new(), Vec::new());
     let mut drawn = Drawn::default();
     for round in 0..WARM_UP + FRAMES {
@@ -135,6 +137,10 @@ fn by_draw(pack: &Pack, camera: &Camera, what: What) -> Result<Picture> {
         What::Views(level, lookup) => {
             let block = ViewsBlock::open(pack)?;
             ViewsLevel::read(&block, level)?.draw(camera, lookup, &style).0
+        }
+        What::Foliage(level) => {
+            let block = FoliageBlock::open(pack)?;
+            FoliageScene::read(&block)?.draw(camera, level, &Wind::default(), &style)
         }
         What::Volume(detail, blending) => {
             let block = VolumeBlock::open(pack)?;

@@ -114,7 +114,9 @@ fn beside_points(t: &mut String, e: &Evaluation) -> Result<()> {
     let level = |s: &Summary| match s.row.knob {
         forest_eval::Knob::Points { s_m, .. } => format!("s_m {s_m} px²"),
         forest_eval::Knob::Views { texels, .. } => format!("{texels}² texels"),
-        forest_eval::Knob::Volume { level } => format!("level {level}"),
+        forest_eval::Knob::Volume { level } | forest_eval::Knob::Foliage { level } => {
+            format!("level {level}")
+        }
         forest_eval::Knob::Share(share) => format!("{share}"),
     };
     for s in e.summaries().iter().filter(|s| s.row.height == 64) {

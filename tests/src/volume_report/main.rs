@@ -77,7 +77,7 @@ fn beside_others(t: &mut String, e: &Evaluation) -> Result<()> {
     let level = |s: &Summary| match s.row.knob {
         Knob::Points { s_m, .. } => format!("s_m {s_m} px²"),
         Knob::Views { texels, .. } => format!("{texels}² texels"),
-        Knob::Volume { level } => format!("level {level}"),
+        Knob::Volume { level } | Knob::Foliage { level } => format!("level {level}"),
         Knob::Share(share) => format!("{share}"),
     };
     for s in e.summaries().iter().filter(|s| s.row.height == 64) {

@@ -10,6 +10,7 @@ pub(crate) use window::run as window;
 use crate::args::Args;
 use crate::failure::Usage;
 use crate::output;
+use crate::sequence::Sequence;
 use anyhow::{Context, Result};
 use forest_gpu::{
     Gpu, Landscape, LandscapeDetail, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Look,
@@ -37,6 +38,21 @@ pub(crate) fn headless(args: &Args, gpu: &Gpu, scene: &Scene) -> Result<()> {
     let mut landscape = Landscape::load(gpu, &renderer, scene)?;
     let target = LandscapeTarget::new(gpu, &renderer, args.size, args.samples)?;
     let mut goal = Goal::new(args, scene)?;
+    if let Some(seconds) = args.sequence {
+        let (mut sequence, winds) = Sequence::new(args, seconds, output)?;
+        for wind in winds {
+            landscape.set_wind(wind);
+            renderer.render(gpu, &mut landscape, &target, &camera, &goal.detail(), None);
+            let pixels = read_picture(gpu, target.samples(), &Look::default(), None)?;
+            sequence.add(args.size, &pixels, false)?;
+        }
+        let written = sequence.finish()?;
+        if !args.quiet {
+            eprintln!("{}: {written}", gpu.name());
+        }
+        return Ok(());
+    }
+    landscape.set_wind(args.wind.unwrap_or_default());
     let mut drawn = LandscapeDrawn::default();
     // Until a rate is reached, where one is asked for.
     let most = if args.fps.is_some() { STEERED } else { 1 };

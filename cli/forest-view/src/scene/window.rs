@@ -7,6 +7,7 @@ use crate::scene::walk::Walk;
 use crate::scene::{Goal, describe};
 use crate::surface::Screen;
 use anyhow::{Context as _, Result};
+use forest_foliage::Wind;
 use forest_gpu::{
     Gpu, Landscape, LandscapeDrawn, LandscapeRenderer, LandscapeTarget, Look, Options, Presenter,
     read_picture,
@@ -56,6 +57,7 @@ struct Viewer<'a> {
     target: LandscapeTarget,
     landscape: Landscape<'a>,
     held: Held,
+    wind: Wind,
     panel: bool,
     pointer: [f64; 2],
     dragging: bool,
@@ -125,6 +127,7 @@ impl<'a> Viewer<'a> {
             target,
             landscape,
             held: Held::default(),
+            wind: args.wind.unwrap_or_default(),
             panel: true,
             pointer: [0.0; 2],
             dragging: false,
@@ -225,7 +228,9 @@ impl<'a> Viewer<'a> {
         walk.fly(self.held.step(passed), land);
         let camera = walk.camera(land, self.target.samples().size());
         let start = Instant::now();
+        self.wind.time += passed as f32;
         let Self { gpu, renderer, landscape, target, .. } = self;
+        landscape.set_wind(self.wind);
         renderer.render(gpu, landscape, target, &camera, &goal.detail(), None);
         self.drawn = landscape.drawn(gpu)?;
         self.milliseconds = start.elapsed().as_secs_f64() * 1e3;

@@ -16,7 +16,7 @@ pub fn csv(e: &Evaluation) -> String {
             Knob::Points { s_m, s_max, k } => format!("{s_m},{s_max},{k},,,,"),
             Knob::Share(share) => format!(",,,{share},,,"),
             Knob::Views { texels, lookup } => format!(",,,,{texels},{lookup:?},").to_lowercase(),
-            Knob::Volume { level } => format!(",,,,,,{level}"),
+            Knob::Volume { level } | Knob::Foliage { level } => format!(",,,,,,{level}"),
         };
         let (c, x) = (&r.cost, &r.errors);
         let elevation = e.views[r.view as usize].elevation;

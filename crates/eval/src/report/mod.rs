@@ -45,7 +45,9 @@ pub(crate) fn knob(k: crate::Knob) -> String {
         crate::Knob::Points { s_m, k: 0.0, .. } => format!("s_m {} px²", short(s_m)),
         crate::Knob::Points { s_m, k, .. } => format!("s_m {} px², k {}", short(s_m), short(k)),
         crate::Knob::Views { texels, .. } => format!("{texels}² texels"),
-        crate::Knob::Volume { level } => format!("level {level}"),
+        crate::Knob::Volume { level } | crate::Knob::Foliage { level } => {
+            format!("level {level}")
+        }
         crate::Knob::Share(share) => format!("{} %", short(100.0 * share)),
     }
 }

@@ -3,6 +3,7 @@
 use crate::frame::FrameUniform;
 use crate::landscape::MOST_BANDS;
 use bytemuck::{Pod, Zeroable};
+use forest_foliage::Wind;
 use forest_points::PixelArea;
 use forest_scene::{HEIGHT_STEPS, OpacityMap, Sky, Tile, is_beside};
 use forest_soup::Camera;
@@ -116,6 +117,7 @@ pub(crate) struct LandUniform {
     impostors: f32,
     least_seen: f32,
     zero: f32,
+    wind: [f32; 4],
 }
 
 /// Points of a far tree that the culling shader draws itself.
@@ -148,7 +150,13 @@ impl LandUniform {
             impostors: detail.impostors as f32,
             least_seen: detail.least_seen as f32,
             zero: 0.0,
+            wind: [0.0; 4],
         }
+    }
+
+    pub(crate) fn with_wind(self, wind: &Wind) -> Self {
+        let [x, _, z] = (wind.direction * wind.strength).to_array();
+        Self { wind: [x, z, wind.time, wind.frequency], ..self }
     }
 }
 

@@ -43,5 +43,11 @@ pub(crate) const MOST_BANDS: usize = 8;
 /// Corners of the triangles of a patch and its skirt.
 pub(crate) const PATCH_VERTICES: u32 = 6 * (forest_scene::PATCH + 2) * (forest_scene::PATCH + 2);
 
+/// Metres between gusts that travel over the land.
+pub(crate) const GUST: f64 = 60.0;
+
+/// Turns by which trees beside each other differ in their swing.
+pub(crate) const OWN_PHASE: f64 = 0.25;
+
 /// Triangles of a run: what an instance of an indirect draw draws.
 pub(crate) const RUN_TRIANGLES: u32 = 64;

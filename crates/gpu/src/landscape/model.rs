@@ -12,6 +12,7 @@ use crate::landscape::tables::{SpeciesRecord, Tables};
 use crate::points::{CellUniform, ChunkRecord};
 use crate::triangles::TrianglesModel;
 use bytemuck::{Pod, Zeroable};
+use forest_foliage::Wind;
 use forest_raster::Light;
 use forest_scene::{Ground, PATCH, Patch, Scene, Tile, ground_vertices, instances};
 use wgpu::{
@@ -59,6 +60,7 @@ pub struct Landscape<'s> {
     species: Vec<SpeciesRecord>,
     maps: [LightMapUniform; 2],
     light: Light,
+    wind: Wind,
     pub(crate) frame: Buffer,
     pub(crate) land: Buffer,
     pub(crate) land_group: BindGroup,
@@ -211,6 +213,7 @@ impl<'s> Landscape<'s> {
             reach: stances.iter().map(|s| s.reach() * s.scale[1]).collect(),
             maps: [&sun, &sky].map(LightMapUniform::new),
             light,
+            wind: Wind::default(),
             frame,
             land,
             land_group,
@@ -232,6 +235,11 @@ impl<'s> Landscape<'s> {
             patch_count: 0,
             bytes,
         })
+    }
+
+    /// The wind that its trees stand in from now on; calm at first.
+    pub fn set_wind(&mut self, wind: Wind) {
+        self.wind = wind;
     }
 
     /// The scene.
@@ -278,7 +286,8 @@ impl<'s> Landscape<'s> {
     ) {
         let samples = crate::frame::supersampled(camera, side);
         let frame = FrameUniform::of_land(&samples, &self.light);
-        let land = LandUniform::new(self.maps, camera, detail, &self.scene.file.sky, side);
+        let land = LandUniform::new(self.maps, camera, detail, &self.scene.file.sky, side)
+            .with_wind(&self.wind);
         let queue = &gpu.queue;
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         queue.write_buffer(&self.land, 0, bytemuck::bytes_of(&land));

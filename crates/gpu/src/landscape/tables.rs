@@ -4,6 +4,8 @@ use crate::error::GpuError;
 use crate::landscape::LandscapeDetail;
 use crate::landscape::impostors::ViewTables;
 use bytemuck::{Pod, Zeroable};
+use forest_foliage::sway::USUAL_LIMBER;
+use forest_foliage::{FoliageBlock, Sway};
 use forest_points::{CellRecord, Order, PointsBlock, SizeCode};
 use forest_scene::{Canopy, IMPOSTOR_FADE, STEPS, Species, Stance};
 use forest_soup::Camera;
@@ -42,7 +44,8 @@ pub(crate) struct SpeciesRecord {
     first_level: u32,
     first_frame: u32,
     first_compass: u32,
-    zero: [u32; 2],
+    limber: f32,
+    zero: u32,
 }
 
 impl SpeciesRecord {
@@ -126,6 +129,10 @@ impl Tables {
         self.triangle_sizes.extend(block.triangles.iter().map(|t| u32::from(t.size)));
         let canopy = Canopy::new(block, stance, Canopy::MOST);
         let views = views.map_or_else(Default::default, |v| self.views.add(v, stance));
+        let limber = match FoliageBlock::is_in(&species.pack) {
+            true => Sway::limber(&FoliageBlock::open(&species.pack)?),
+            false => USUAL_LIMBER,
+        };
         let below = block.cells.iter().filter(|c| !c.is_top());
         self.species.push(SpeciesRecord {
             center: ((min + max) * 0.5).as_vec3().to_array(),
@@ -156,7 +163,8 @@ impl Tables {
             first_level: views.first_level,
             first_frame: views.first_frame,
             first_compass: views.first_compass,
-            zero: [0; 2],
+            limber,
+            zero: 0,
         });
         self.points += block.points.len() as u32;
         Ok(())

@@ -23,9 +23,9 @@ struct Cell {
     clump: f32,
     // Height from the eye below which nothing is drawn.
     cut: f32,
-    zero0: f32,
-    zero1: f32,
-    zero2: f32,
+    // Height of its tree's foot from the eye, and how the tree leans.
+    foot: f32,
+    lean: vec2f,
 }
 
 // A vector of the block in the world.
@@ -34,7 +34,8 @@ fn turned(turn: vec2f, v: vec3f) -> vec3f {
 }
 
 fn place_in(cell: Cell, steps: vec3u) -> vec3f {
-    return cell.origin + turned(cell.turn, vec3f(steps) * cell.step);
+    let place = cell.origin + turned(cell.turn, vec3f(steps) * cell.step);
+    return place + sway_at(place.y, cell.foot, cell.lean);
 }
 
 fn point_number(cell: Cell, index: u32) -> u32 {

@@ -26,6 +26,10 @@ struct Frame {
     // Of the block, from the eye, and half its diagonal: what Z of the self-shadow is measured by.
     middle: vec3f,
     half_diagonal: f32,
+    // How the block leans in the wind, and the height of its foot from the eye.
+    lean: vec2f,
+    foot: f32,
+    zero: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -103,6 +107,13 @@ fn fades_in(fade: vec2f, at: vec2u) -> bool {
     }
     let h = sample_hash(FADE, at);
     return h >= fade.x && h < fade.y;
+}
+
+// --- forest_foliage::Sway -----------------------------------------------------------------------
+
+fn sway_at(y: f32, foot: f32, lean: vec2f) -> vec3f {
+    let height = max(y - foot, 0.0);
+    return vec3f(lean.x, 0.0, lean.y) * (height * height);
 }
 
 // --- light ------------------------------------------------------------------------------------

@@ -307,10 +307,31 @@ fn find(ray: Ray, at: vec2u) -> Hit {
     return hit;
 }
 
+// How far the tree leans where a ray passes its upright axis, in units of half a tile: the ray sees what
+// stands there at rest.
+fn sway_of(ray: Ray) -> vec3f {
+    if all(frame.lean == vec2f(0.0)) {
+        return vec3f(0.0);
+    }
+    let d = ray.direction;
+    let aside = max(dot(d.xz, d.xz), 1e-6);
+    let y = ray.origin.y - d.y * dot(ray.origin.xz, d.xz) / aside;
+    // Heights from the eye; the tree ends a ball's radius above its middle.
+    let high = min(y, sprite.reach) - sprite.eye.y;
+    return sway_at(high * sprite.half, frame.foot, frame.lean) / sprite.half;
+}
+
 @vertex
 fn vertex(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
     let corner = vec2f(f32(vertex & 1u), f32(vertex >> 1u));
-    return flat_clip(mix(sprite.low, sprite.high, corner), 0.5);
+    // Room for how far its top leans.
+    let top = sway_at((sprite.reach - sprite.eye.y) * sprite.half, frame.foot, frame.lean);
+    let nearest = max(length(sprite.eye) - sprite.reach, 1e-3) * sprite.half;
+    let room = length(top) * select(frame.scale / nearest, frame.scale, frame.parallel != 0u);
+    let low = max(sprite.low - room, vec2f(0.0));
+    let high = min(sprite.high + room, frame.size);
+    let is_there = all(sprite.high > sprite.low);
+    return flat_clip(select(sprite.low, mix(low, high, corner), is_there), 0.5);
 }
 
 struct Sample {
@@ -324,12 +345,14 @@ fn fragment(@builtin(position) position: vec4f) -> Sample {
     if !fades_in(sprite.fade, at) {
         discard;
     }
-    let ray = ray_of(position.xy);
+    let still = ray_of(position.xy);
+    let shift = sway_of(still);
+    let ray = Ray(still.origin - shift, still.direction, still.from_distance);
     let hit = find(ray, at);
     if hit.found != FOUND_HIT {
         discard;
     }
-    let place = (ray.origin + ray.direction * hit.distance - sprite.eye) * sprite.half;
+    let place = (still.origin + ray.direction * hit.distance - sprite.eye) * sprite.half;
     let depth = dot(place, frame.forward);
     if is_behind(depth) {
         discard;

@@ -127,7 +127,8 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let node = level.nodes + item.node;
     let xy = nodes[node * 5u];
     let place = vec3f(vec3u(xy & 0xffffu, xy >> 16u, nodes[node * 5u + 1u] & 0xffffu));
-    let center = volume.corner + (place + 0.5) * level.side;
+    let still = volume.corner + (place + 0.5) * level.side;
+    let center = still + sway_at(still.y, frame.foot, frame.lean);
     let at = project(center);
     var out: Billboard;
     out.center = at.xy;

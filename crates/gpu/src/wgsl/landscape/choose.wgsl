@@ -44,14 +44,16 @@ fn cull(
     let t = tree_of(index);
     let s = species_table[t.species];
     let center = place_of(t, s.center);
-    let radius = s.radius * t.scale;
+    // Wherever the wind bends it.
+    let reach = length(lean_of(t, s)) * pow(2.0 * s.tall * t.scale, 2.0);
+    let radius = s.radius * t.scale + reach;
     let distance = length(center);
     if distance < bitcast<f32>(band.z) || distance >= bitcast<f32>(band.w) || is_beside(center, radius) {
         return;
     }
     let board = board_of(t, s);
     let asks = board.share < 1.0;
-    let share = cylinder_open(center, s.wide * t.scale, s.tall * t.scale, asks);
+    let share = cylinder_open(center, s.wide * t.scale + reach, s.tall * t.scale, asks);
     if share == 0.0 {
         return;
     }
@@ -168,9 +170,8 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32,
         t.mask,
         s.clump,
         cut,
-        0.0,
-        0.0,
-        0.0,
+        t.foot.y,
+        lean_of(t, s),
     );
     for (var k = 0u; k < count; k++) {
         let index = stock.first_point + k;
@@ -268,7 +269,7 @@ fn choose(
             continue;
         }
         let center = place_of(t, stock.center);
-        let radius = stock.radius * t.scale;
+        let radius = stock.radius * t.scale + length(sway_at(center.y, t.foot.y, lean_of(t, s)));
         if is_beside(center, radius) {
             continue;
         }

@@ -39,6 +39,14 @@ struct Corner {
     // Of the hash rule; share of the samples.
     @location(8) @interpolate(flat) mask: u32,
     @location(9) @interpolate(flat) share: f32,
+    // What the tree leans for the square of a height, in texels of each view's tile; its foot's height.
+    @location(10) @interpolate(flat) lean: vec4f,
+    @location(11) @interpolate(flat) lean_last: vec3f,
+}
+
+// A displacement in the tree's own frame on a view's tile, in texels.
+fn on_tile(v: ViewFrame, d: vec3f, half: f32, texels: f32) -> vec2f {
+    return vec2f(dot(d, v.right.xyz), -dot(d, v.up.xyz)) * (0.5 * texels / half);
 }
 
 // forest_scene::foliage
@@ -102,8 +110,20 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     let c = shown(v[2], level.first_tile + views.z, level.texels, across, down);
     let low = min(min(a.xy, b.xy), c.xy);
     let high = max(max(a.zw, b.zw), c.zw);
-    let corner = mix(low, high, vec2f(f32(index & 1u), f32(index >> 1u)));
     let half = 0.5 * s.view_side * t.scale;
+    // Room for how far its top leans.
+    let leaning = lean_of(t, s);
+    let lean = turned(back, vec3f(leaning.x, 0.0, leaning.y));
+    let square = pow(2.0 * s.tall * t.scale, 2.0);
+    let room = abs(vec2f(dot(lean, across), dot(lean, down))) * (square / half);
+    let corner = mix(low - room, high + room, vec2f(f32(index & 1u), f32(index >> 1u)));
+    let tile_lean = array(
+        on_tile(v[0], lean, half, level.texels),
+        on_tile(v[1], lean, half, level.texels),
+        on_tile(v[2], lean, half, level.texels),
+    );
+    out.lean = vec4f(tile_lean[0], tile_lean[1]);
+    out.lean_last = vec3f(tile_lean[2], t.foot.y);
     out.place = center + (right * corner.x - up * corner.y) * half;
     let at = project(out.place);
     // It stands about the tree's axis.
@@ -133,14 +153,17 @@ fn fragment(in: Corner) -> @location(0) vec4f {
         discard;
     }
     let pick = sample_hash(PICK ^ in.mask, sample);
+    // What is seen there stood elsewhere at rest.
+    let height = max(in.place.y - in.lean_last.z, 0.0);
+    let square = height * height;
     var view = in.views.x;
-    var at = in.at.xy;
+    var at = in.at.xy - in.lean.xy * square;
     if pick >= in.shares.y {
         view = in.views.z;
-        at = in.at_last;
+        at = in.at_last - in.lean_last.xy * square;
     } else if pick >= in.shares.x {
         view = in.views.y;
-        at = in.at.zw;
+        at = in.at.zw - in.lean.zw * square;
     }
     let p = page_texel(tile_of(view), vec2i(floor(at)));
     if p.x < 0 {
@@ -153,7 +176,7 @@ fn fragment(in: Corner) -> @location(0) vec4f {
     if frame.lit == 0u {
         return vec4f(color.rgb, 1.0);
     }
-    let height = 1.0 - 2.0 * textureLoad(depth_pages, p.xy, p.z, 0).x;
-    let seen = seen_at(in.place + in.rise * height);
+    let toward = 1.0 - 2.0 * textureLoad(depth_pages, p.xy, p.z, 0).x;
+    let seen = seen_at(in.place + in.rise * toward);
     return vec4f(color.rgb * (in.sun * seen.x + in.sky * seen.y), 1.0);
 }

@@ -38,6 +38,8 @@ struct Land {
     // What less light than this comes through to the eye from is left out.
     least_seen: f32,
     zero: f32,
+    // Its direction along x and z as long as it is strong, seconds, and swings a second.
+    wind: vec4f,
 }
 
 @group(0) @binding(1) var<uniform> land: Land;

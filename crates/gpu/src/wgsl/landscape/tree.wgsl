@@ -47,8 +47,9 @@ struct Species {
     first_level: u32,
     first_frame: u32,
     first_compass: u32,
-    zero0: u32,
-    zero1: u32,
+    // Displacement of the top in a wind of strength 1 that pushes by 1, in heights.
+    limber: f32,
+    zero: u32,
 }
 
 // A cell of a species, in metres from the foot of a tree of scale 1.
@@ -101,6 +102,26 @@ fn place_of(t: Tree, off: vec3f) -> vec3f {
 // Pixels of a block unit at a distance.
 fn pixels(t: Tree, block_unit: f32, distance: f32) -> f32 {
     return frame.scale / distance * block_unit * t.scale;
+}
+
+// How a tree leans: forest_foliage::Sway::new. Gusts travel over the land.
+fn lean_of(t: Tree, s: Species) -> vec2f {
+    let strength = length(land.wind.xy);
+    if strength <= 0.0 {
+        return vec2f(0.0);
+    }
+    let direction = land.wind.xy / strength;
+    let at = t.foot.xz + land.eye.xz;
+    let phase = f32(t.mask & 0xffffu) / 65536.0 * OWN_PHASE - dot(at, direction) / GUST;
+    var push = vec2f(STEADY, 0.0);
+    for (var k = 0u; k < 4u; k++) {
+        let turns = land.wind.z * land.wind.w * SWINGS[k].y + phase + SWINGS[k].z;
+        push[k >> 1u] += SWINGS[k].x * sin(fract(turns) * 2.0 * HALF_TURN);
+    }
+    // forest_foliage::Wind: across is along × up.
+    let moved = direction * push.x + vec2f(-direction.y, direction.x) * push.y;
+    let top = moved * (strength * s.limber);
+    return top * min(MOST_LEAN / max(length(top), 1e-6), 1.0) / (2.0 * s.tall * t.scale);
 }
 
 struct Board {

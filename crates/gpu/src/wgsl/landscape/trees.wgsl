@@ -128,9 +128,8 @@ fn put_cell(t: Tree, s: Species, stock: Stock, fine: i32, coarse: i32, cut: f32,
         t.mask,
         s.clump,
         cut,
-        0.0,
-        0.0,
-        0.0,
+        t.foot.y,
+        lean_of(t, s),
     );
     return i32(slot);
 }

@@ -1,0 +1,177 @@
+//! One level: thick branches, sheets of thin ones, cards of leaves.
+
+use crate::density::Density;
+use crate::header::WoodWay;
+use crate::leaf::{Card, Leaf, cards, clusters};
+use crate::mesh::Mesh;
+use crate::panel::Panel;
+use crate::sheet::sheets;
+use crate::thick::{WoodErrors, thick};
+use crate::wood::Wood;
+use forest_raster::Surfaces;
+use forest_soup::TriangleSoup;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// What levels are made of.
+pub(crate) struct Tree<'a> {
+    pub(crate) soup: &'a TriangleSoup,
+    pub(crate) surfaces: &'a Surfaces,
+    pub(crate) wood: &'a Wood,
+    pub(crate) leaves: &'a [Leaf],
+    pub(crate) density: &'a Density,
+    /// Mean visible area of each triangle of the soup.
+    pub(crate) visible: &'a [f64],
+}
+
+/// A panel in the tree.
+pub(crate) struct Placed {
+    pub(crate) panel: Panel,
+    /// Branch record and share of its length.
+    pub(crate) on: (u32, f32),
+    /// Where it hangs; leaves turn about it, sheets do not turn.
+    pub(crate) pivot: Option<DVec3>,
+    pub(crate) openness: f64,
+}
+
+/// A level as it is baked.
+pub(crate) struct Level {
+    pub(crate) texel: f64,
+    pub(crate) thick: Mesh,
+    pub(crate) way: WoodWay,
+    pub(crate) errors: [WoodErrors; 2],
+    pub(crate) tubes: u32,
+    pub(crate) hidden: u32,
+    /// Sheets first, then cards.
+    pub(crate) panels: Vec<Placed>,
+    pub(crate) sheets: u32,
+}
+
+/// Radius in texels below which branches are thin.
+const THIN: f64 = 0.75;
+
+/// Groups of thin branches whose box is smaller than this many texels lie on cards with the leaves.
+const SMALL_GROUP: f64 = 12.0;
+
+/// Extent in texels of what lies on one card.
+pub(crate) const CARD: f64 = 16.0;
+
+/// What is seen of less than this many texels is left out.
+const UNSEEN: f64 = 1.0;
+
+impl Tree<'_> {
+    /// The level for texels of this size.
+    pub(crate) fn level(&self, texel: f64) -> Level {
+        let Self { soup, surfaces, wood, .. } = *self;
+        let groups = wood.groups(THIN * texel);
+        let is_seen = |triangles: &[u32]| {
+            triangles.iter().map(|&i| self.visible[i as usize]).sum::<f64>()
+                >= UNSEEN * texel * texel
+        };
+        let mut hidden = 0;
+        let mut which = Vec::new();
+        let mut thin: Vec<Vec<u32>> = vec![Vec::new(); groups.len()];
+        for (i, group) in (0u32..).zip(&groups) {
+            let own = &wood.triangles[i as usize];
+            match group {
+                Some(g) => thin[*g as usize].extend(own),
+                None if own.is_empty() => {}
+                None if is_seen(own) => which.push(i),
+                None => hidden += 1,
+            }
+        }
+        let (mesh, way, errors) = thick(soup, surfaces, wood, &which, texel);
+        let mut twigs: Vec<Leaf> = Vec::new();
+        let mut large: Vec<(u32, Vec<u32>)> = Vec::new();
+        for (g, triangles) in (0u32..).zip(thin).filter(|(_, t)| !t.is_empty()) {
+            if !is_seen(&triangles) {
+                hidden += 1;
+            } else if extent(soup, &triangles) < SMALL_GROUP * texel {
+                twigs.push(self.twig(g, triangles));
+            } else {
+                large.push((g, triangles));
+            }
+        }
+        let sheets = large.into_par_iter().flat_map_iter(|(g, triangles)| {
+            let branch = &wood.branches.branches[g as usize];
+            let at = 0.5 * branch.length();
+            let on = wood.rig.place(crate::branch::OnBranch { branch: g, at });
+            sheets(soup, surfaces, &triangles, texel).into_iter().map(move |panel| Placed {
+                on,
+                pivot: None,
+                openness: self.density.openness(panel.center),
+                panel,
+            })
+        });
+        let mut panels: Vec<Placed> = sheets.collect();
+        let sheets = panels.len() as u32;
+        panels.extend(self.cards(twigs, texel));
+        let tubes = which.len() as u32;
+        Level { texel, thick: mesh, way, errors, tubes, hidden, panels, sheets }
+    }
+
+    /// A small group of thin branches, as something that lies on a card.
+    fn twig(&self, branch: u32, triangles: Vec<u32>) -> Leaf {
+        let soup = self.soup;
+        let mut tensor = crate::tensor::NormalTensor::default();
+        let mut center = DVec3::ZERO;
+        for &i in &triangles {
+            let [a, b, c] = soup.corners(i as usize).map(|p| p.as_dvec3());
+            let cross = (b - a).cross(c - a);
+            tensor.add(cross);
+            center += (a + b + c) / 3.0 * (0.5 * cross.length());
+        }
+        let base = &self.wood.branches.branches[branch as usize];
+        let middle = crate::branch::OnBranch { branch, at: 0.5 * base.length() };
+        Leaf {
+            triangles,
+            center: center / tensor.area.max(f64::MIN_POSITIVE),
+            area: tensor.area,
+            // Across its thinnest side: tubes face all ways but along.
+            facing: tensor.axes().1.x_axis,
+            turns: false,
+            on: self.wood.rig.place(middle),
+            pivot: base.line[0],
+        }
+    }
+
+    /// Cards of leaves and twigs.
+    fn cards(&self, twigs: Vec<Leaf>, texel: f64) -> Vec<Placed> {
+        let mut all = self.leaves.to_vec();
+        all.extend(twigs);
+        let clusters = clusters(&all, CARD * texel);
+        let cards: Vec<Card> =
+            clusters.par_iter().flat_map_iter(|c| cards(self.soup, &all, c)).collect();
+        let placed = cards.par_iter().filter_map(|card| {
+            let panel = Panel::of_card(self.soup, self.surfaces, &all, card, texel)?;
+            let area: f64 = card.leaves.iter().map(|&i| all[i as usize].area).sum();
+            let weighted =
+                card.leaves.iter().map(|&i| all[i as usize].pivot * all[i as usize].area);
+            let pivot = weighted.sum::<DVec3>() / area.max(f64::MIN_POSITIVE);
+            let openness = self.density.openness(panel.center);
+            Some(Placed { on: main_branch(&all, card), pivot: Some(pivot), openness, panel })
+        });
+        placed.collect()
+    }
+}
+
+/// The branch that holds most of a card's leaves, and where they hang on it in the mean.
+fn main_branch(leaves: &[Leaf], card: &Card) -> (u32, f32) {
+    let mut sums: hashbrown::HashMap<u32, (f64, f64)> = hashbrown::HashMap::new();
+    for leaf in card.leaves.iter().map(|&i| &leaves[i as usize]) {
+        let sum = sums.entry(leaf.on.0).or_default();
+        *sum = (sum.0 + leaf.area, sum.1 + leaf.area * f64::from(leaf.on.1));
+    }
+    let most = sums.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)));
+    most.map_or((0, 0.0), |(branch, (area, at))| {
+        (branch, (at / area.max(f64::MIN_POSITIVE)) as f32)
+    })
+}
+
+fn extent(soup: &TriangleSoup, triangles: &[u32]) -> f64 {
+    let corners = triangles.iter().flat_map(|&i| soup.corners(i as usize));
+    let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| {
+        (min.min(p.as_dvec3()), max.max(p.as_dvec3()))
+    });
+    (max - min).max_element()
+}
