@@ -6,6 +6,7 @@
 #   make bench    measure bakes; writes docs/BENCH.md and docs/LEVELS.txt
 #   make report   evaluate the trees; writes docs/REPORT.md, the README's figures, out/report/*.html
 #   make views    measure views; writes docs/VIEWS.md and docs/views.svg
+#   make light    measure what each factor of the light on leaves buys; writes docs/LIGHT.md
 #   make volume   measure volumes; writes docs/VOLUME.md, docs/volume.svg, docs/volume_heldout.png
 #   make view     measure the viewer; writes docs/VIEWER.md and the README's pictures of it
 #   make landscape  measure landscapes beside full meshes, LOD meshes and billboards; writes docs/LANDSCAPE.md
@@ -22,7 +23,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+.PHONY: light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
 
 # Installs what variable `missing` of a recipe's shell names, or says what to install.
 INSTALL = if [ -n "$$missing" ]; then \
@@ -133,6 +134,10 @@ report: setup
 views: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/views
+
+light: setup
+	$(CARGO) build --release -p forest-tests --bin light
+	target/release/light
 
 volume: setup
 	$(CARGO) build --release --workspace --bins

@@ -458,8 +458,8 @@ fn representations_lean_alike_in_the_wind() {
         What::Volume(Detail::Level(5), Blending::Shares),
     ] {
         let own = shift(what);
-        // A quarter of a per cent of the tree.
-        assert!((own - foliage).abs() < 0.5, "{what:?}: {own} px, not {foliage}");
+        // Less than half a per cent of the tree's height: below a pixel where levels change.
+        assert!((own - foliage).abs() < 0.8, "{what:?}: {own} px, not {foliage}");
     }
 }
 

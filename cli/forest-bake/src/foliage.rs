@@ -93,6 +93,7 @@ struct Summary {
     skeleton_seconds: f64,
     visibility_seconds: f64,
     levels_seconds: f64,
+    light_seconds: f64,
     dictionary_seconds: f64,
 }
 
@@ -138,7 +139,8 @@ impl Summary {
             image: e.image,
         };
         let levels = report.header.levels.iter().zip(&report.wood);
-        let [skeleton, visibility, making, dictionary] = report.times.map(|t| t.as_secs_f64());
+        let [skeleton, visibility, making, light, dictionary] =
+            report.times.map(|t| t.as_secs_f64());
         Ok(Self {
             output: args.output.clone(),
             bytes: std::fs::metadata(&args.output)?.len(),
@@ -179,6 +181,7 @@ impl Summary {
             skeleton_seconds: skeleton,
             visibility_seconds: visibility,
             levels_seconds: making,
+            light_seconds: light,
             dictionary_seconds: dictionary,
         })
     }

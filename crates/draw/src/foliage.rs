@@ -2,7 +2,7 @@
 
 use forest_foliage::{FoliageBlock, Posed, VertexRecord, Wind};
 use forest_pack::PackError;
-use forest_raster::{Picture, Style, Surfaces, rasterize};
+use forest_raster::{Light, Picture, ShadowMap, Style, Surfaces, rasterize, rasterize_shadowed};
 use forest_soup::{Camera, Material, Texture, TriangleSoup};
 use std::sync::Arc;
 
@@ -37,9 +37,15 @@ impl<'a> FoliageScene<'a> {
         self.block.soup(level, posed, &self.materials, &self.textures)
     }
 
-    /// Draws a level as `camera` sees it in `wind`.
+    /// Draws a level as `camera` sees it in `wind`: under a sun with the shadows of its own map, and what
+    /// lies on cards as leaves that face all ways (docs/LIGHT.md).
     pub fn draw(&self, camera: &Camera, level: usize, wind: &Wind, style: &Style) -> Picture {
-        rasterize(&self.soup(camera, level, wind), &self.surfaces, camera, style)
+        let soup = self.soup(camera, level, wind);
+        let Light::Sun(sun) = style.light else {
+            return rasterize(&soup, &self.surfaces, camera, style);
+        };
+        let map = ShadowMap::new(&soup, &self.surfaces, self.block.bounds(), sun.to_sun);
+        rasterize_shadowed(&soup, &self.surfaces, camera, style, Arc::new(map))
     }
 
     /// Triangles of a level, and bytes of its vertices and indices.

@@ -217,6 +217,7 @@ fn corners(
         Corner {
             position,
             sunlit: style.light.seen(position - block.middle(), block.half_diagonal()),
+            skylit: 1.0,
             normal: decode_axis(v.normal).as_vec3(),
             uv: Vec2::from_array(range.decode(v.uv)),
             color,

@@ -256,6 +256,8 @@ fn with_triangles(
         normals: pick(&soup.normals, &used),
         uvs: pick(&soup.uvs, &used),
         colors: pick(&soup.colors, &used),
+        sunlit: pick(&soup.sunlit, &used),
+        skylit: pick(&soup.skylit, &used),
         triangles,
         triangle_materials,
         materials: soup.materials.clone(),

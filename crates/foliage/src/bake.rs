@@ -1,9 +1,10 @@
 //! A tree into the sections of the foliage representation.
 
+use crate::block::{dictionary_material, dictionary_texture, level_soup};
 use crate::branch::OnBranch;
-use crate::density::Density;
 use crate::dictionary::{Layout, MOST_SIDE, atlas, encode};
 use crate::error::FoliageError;
+use crate::fit::Brightness;
 use crate::header::{DICTIONARY, Draw, FoliageHeader, LevelHeader, VertexRecord};
 use crate::leaf::{Leaf, leaves};
 use crate::level::{CARD, Level, Placed, Tree};
@@ -11,7 +12,7 @@ use crate::options::FoliageOptions;
 use crate::parts::{MaterialParts, Part, Parts};
 use crate::thick::WoodErrors;
 use crate::validate::validate;
-use crate::visible::visible_areas;
+use crate::visible::Visible;
 use crate::weld::Welded;
 use crate::wood::Wood;
 use forest_pack::{Codec, PackWriter, SectionId, header, kind};
@@ -21,6 +22,7 @@ use forest_raster::Surfaces;
 use forest_soup::{Bounds, TriangleSoup, linear_to_srgb8};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// What a bake did.
@@ -38,8 +40,8 @@ pub struct BakeReport {
     pub leaves: usize,
     /// Share of the dictionary that its pictures fill.
     pub filled: f64,
-    /// Skeleton, visibility, levels, dictionary.
-    pub times: [Duration; 4],
+    /// Skeleton, visibility, levels, light, dictionary.
+    pub times: [Duration; 5],
 }
 
 /// A level's arrays as they are written.
@@ -83,19 +85,11 @@ pub fn bake(
     }
     let skeleton = start.elapsed();
     let start = Instant::now();
-    let visible = visible_areas(soup);
+    let visible = Visible::of(soup);
     let looking = start.elapsed();
     let start = Instant::now();
     let surfaces = Surfaces::new(&soup.materials, &soup.textures);
-    let density = Density::new(&leaves, size);
-    let tree = Tree {
-        soup,
-        surfaces: &surfaces,
-        wood: &wood,
-        leaves: &leaves,
-        density: &density,
-        visible: &visible,
-    };
+    let tree = Tree { soup, surfaces: &surfaces, wood: &wood, leaves: &leaves, visible: &visible };
     let levels: Vec<Level> = (0..options.levels)
         .map(|l| {
             let level = tree.level(finest * f64::from(l).exp2());
@@ -110,13 +104,19 @@ pub fn bake(
     let crown = crown(soup, &leaves);
     let mut places = layout.places.iter().copied();
     let pivot_step = 2.0 * size / f64::from(i16::MAX);
-    let arrays: Vec<Arrays> = levels
+    let mut arrays: Vec<Arrays> = levels
         .iter()
         .map(|level| {
             let at: Vec<[u32; 2]> = places.by_ref().take(level.panels.len()).collect();
             Packing { wood: &wood, crown, atlas: layout.size, pivot_step }.level(level, &at)
         })
         .collect();
+    let pictures = atlas(&panels, &layout);
+    let lighting = start.elapsed();
+    let start = Instant::now();
+    brighten(soup, &surfaces, &mut arrays, layout.size, &pictures[0]);
+    let lighting = (lighting, start.elapsed());
+    let start = Instant::now();
     let mut branches = [0; 4];
     wood.branches.branches.iter().for_each(|b| branches[b.order.min(3) as usize] += 1);
     let header = FoliageHeader {
@@ -142,7 +142,6 @@ pub fn bake(
         let rows: &[u8] = bytemuck::cast_slice(&arrays.indices);
         writer.add(id(kind::FOLIAGE_INDICES), Codec::None, rows)?;
     }
-    let pictures = atlas(&panels, &layout);
     for (mip, texels) in (0..).zip(&pictures) {
         let bytes = match options.blocks {
             true => encode(texels, layout.size[0] >> mip),
@@ -163,8 +162,32 @@ pub fn bake(
         wood: levels.iter().map(|l| l.errors).collect(),
         leaves: leaves.len(),
         filled: texels as f64 / all as f64,
-        times: [skeleton, looking, making, start.elapsed()],
+        times: [skeleton, looking, making, lighting.1, lighting.0 + start.elapsed()],
     })
+}
+
+/// Weighs the light on cards, so that each level is as bright as the source.
+fn brighten(
+    soup: &TriangleSoup,
+    surfaces: &Surfaces,
+    arrays: &mut [Arrays],
+    size: [u32; 2],
+    texels: &[[u8; 4]],
+) {
+    let (mut materials, mut textures) = (soup.materials.clone(), soup.textures.clone());
+    materials.push(dictionary_material(textures.len() as u32));
+    textures.push(Arc::new(dictionary_texture(size, texels.to_vec())));
+    let own = Surfaces::new(&materials, &textures);
+    let truth = Brightness::of(soup, surfaces);
+    for Arrays { header, vertices, indices } in arrays {
+        let mut level = level_soup(header, vertices, indices, &materials, &textures);
+        level.origin = soup.origin;
+        let [sun, sky] = truth.weights(&mut level, &own);
+        header.sunlit = sun as f32;
+        for v in &mut vertices[header.wood_vertices as usize..] {
+            v.openness = (f64::from(v.openness) * sky).round().min(255.0) as u8;
+        }
+    }
 }
 
 /// Hangs leaves on the branches: each by the corner that is nearest to wood.
@@ -207,7 +230,7 @@ impl Packing<'_> {
                 branch,
                 along,
                 normal: encode_axis(v.normal),
-                openness: u8::MAX,
+                openness: (v.skylit * 255.0).round() as u8,
                 color: color(v.color),
                 ..VertexRecord::default()
             }
@@ -227,6 +250,8 @@ impl Packing<'_> {
         let header = LevelHeader {
             texel: level.texel,
             vertices: vertices.len() as u32,
+            wood_vertices: level.thick.vertices.len() as u32,
+            sunlit: 1.0,
             draws: by_material
                 .iter()
                 .map(|(material, t)| Draw { material: *material, triangles: t.len() as u32 })

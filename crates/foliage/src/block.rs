@@ -1,7 +1,7 @@
 //! Reading the foliage of a pack.
 
 use crate::dictionary::{MIPS, decode};
-use crate::header::{DICTIONARY, Draw, FoliageHeader, VertexRecord};
+use crate::header::{DICTIONARY, Draw, FoliageHeader, LevelHeader, VertexRecord};
 use crate::validate::{is_material, validate, validate_header};
 use crate::wind::{BranchRecord, Pose, Wind};
 use forest_pack::measures::{ErrorKind, Light, Need};
@@ -106,12 +106,12 @@ impl<'a> FoliageBlock<'a> {
     /// # Errors
     /// When the section is missing or damaged.
     pub fn dictionary(&self) -> Result<Texture, PackError> {
-        let Mip { size: [width, height], bytes } = self.stored()?.swap_remove(0);
+        let Mip { size, bytes } = self.stored()?.swap_remove(0);
         let texels = match self.header.blocks {
-            true => decode(&bytes, width),
+            true => decode(&bytes, size[0]),
             false => bytes.as_chunks::<4>().0.to_vec(),
         };
-        Ok(Texture { name: "dictionary".into(), width, height, texels, wrap: [Wrap::Clamp; 2] })
+        Ok(dictionary_texture(size, texels))
     }
 
     /// Materials and textures that levels are drawn with: those of the source, and last the
@@ -130,14 +130,7 @@ impl<'a> FoliageBlock<'a> {
                 return Err(PackError::invalid(self.pack.path(), id, problem));
             }
         }
-        materials.push(Material {
-            name: "dictionary".into(),
-            texture: Some(textures.len() as u32),
-            // What covers a part of a texel covers a part of its samples.
-            alpha_mode: AlphaMode::Blend,
-            double_sided: true,
-            ..Material::default()
-        });
+        materials.push(dictionary_material(textures.len() as u32));
         textures.push(Arc::new(self.dictionary()?));
         Ok((materials, textures))
     }
@@ -153,7 +146,7 @@ impl<'a> FoliageBlock<'a> {
             _ if depth <= 0.0 => f64::INFINITY,
             _ => camera.pixels_per_unit(depth),
         };
-        let fits = |l: &crate::header::LevelHeader| l.texel * wide <= pixels;
+        let fits = |l: &LevelHeader| l.texel * wide <= pixels;
         self.header.levels.iter().rposition(fits).unwrap_or(0)
     }
 
@@ -178,35 +171,70 @@ impl<'a> FoliageBlock<'a> {
         materials: &[Material],
         textures: &[Arc<Texture>],
     ) -> TriangleSoup {
-        let vertices = self.vertices[level];
-        let dictionary = materials.len() as u16 - 1;
-        let draws = &self.header.levels[level].draws;
-        let material = |d: &Draw| if d.material == DICTIONARY { dictionary } else { d.material };
-        let place = |v: &VertexRecord| match &posed {
-            Some(posed) => posed.place(self, v),
-            None => (Vec3::from(v.position), decode_axis(v.normal).as_vec3()),
-        };
-        let (positions, normals) = vertices.iter().map(place).unzip();
-        let color = |v: &VertexRecord| {
-            let [r, g, b, a] = v.color;
-            let [r, g, b] = [r, g, b].map(srgb8_to_linear);
-            [r, g, b, f32::from(a) / 255.0]
-        };
-        TriangleSoup {
-            origin: self.origin(),
-            positions,
-            normals,
-            uvs: vertices.iter().map(|v| Vec2::from(v.uv)).collect(),
-            colors: vertices.iter().map(color).collect(),
-            triangles: self.indices[level].to_vec(),
-            triangle_materials: draws
-                .iter()
-                .flat_map(|d| std::iter::repeat_n(material(d), d.triangles as usize))
-                .collect(),
-            materials: materials.to_vec(),
-            textures: textures.to_vec(),
+        let header = &self.header.levels[level];
+        let (vertices, triangles) = (self.vertices[level], self.indices[level]);
+        let mut soup = level_soup(header, vertices, triangles, materials, textures);
+        soup.origin = self.origin();
+        if let Some(posed) = &posed {
+            let place = |v: &VertexRecord| posed.place(self, v);
+            (soup.positions, soup.normals) = vertices.iter().map(place).unzip();
         }
+        soup
     }
+}
+
+/// A level at rest as a soup, about the block's origin.
+pub(crate) fn level_soup(
+    header: &LevelHeader,
+    vertices: &[VertexRecord],
+    triangles: &[[u32; 3]],
+    materials: &[Material],
+    textures: &[Arc<Texture>],
+) -> TriangleSoup {
+    let dictionary = materials.len() as u16 - 1;
+    let material = |d: &Draw| if d.material == DICTIONARY { dictionary } else { d.material };
+    let color = |v: &VertexRecord| {
+        let [r, g, b, a] = v.color;
+        let [r, g, b] = [r, g, b].map(srgb8_to_linear);
+        [r, g, b, f32::from(a) / 255.0]
+    };
+    let sunlit = |i: u32| if i < header.wood_vertices { 1.0 } else { header.sunlit };
+    TriangleSoup {
+        positions: vertices.iter().map(|v| v.position.into()).collect(),
+        normals: vertices.iter().map(|v| decode_axis(v.normal).as_vec3()).collect(),
+        uvs: vertices.iter().map(|v| Vec2::from(v.uv)).collect(),
+        colors: vertices.iter().map(color).collect(),
+        sunlit: (0..vertices.len() as u32).map(sunlit).collect(),
+        skylit: vertices.iter().map(|v| f32::from(v.openness) / 255.0).collect(),
+        triangles: triangles.to_vec(),
+        triangle_materials: header
+            .draws
+            .iter()
+            .flat_map(|d| std::iter::repeat_n(material(d), d.triangles as usize))
+            .collect(),
+        materials: materials.to_vec(),
+        textures: textures.to_vec(),
+        ..TriangleSoup::default()
+    }
+}
+
+/// The material of what lies on cards and sheets; its texture is number `texture`.
+pub(crate) fn dictionary_material(texture: u32) -> Material {
+    Material {
+        name: "dictionary".into(),
+        texture: Some(texture),
+        // What covers a part of a texel covers a part of its samples.
+        alpha_mode: AlphaMode::Blend,
+        double_sided: true,
+        // Its pictures hold many leaves.
+        scattered: true,
+        ..Material::default()
+    }
+}
+
+/// The texture of a dictionary.
+pub(crate) fn dictionary_texture([width, height]: [u32; 2], texels: Vec<[u8; 4]>) -> Texture {
+    Texture { name: "dictionary".into(), width, height, texels, wrap: [Wrap::Clamp; 2] }
 }
 
 /// A tree in the wind, as an eye sees it.

@@ -36,6 +36,10 @@ pub struct LevelHeader {
     pub texel: f64,
     /// Number of vertices.
     pub vertices: u32,
+    /// The first of them, which are wood; the others are those of cards and sheets.
+    pub wood_vertices: u32,
+    /// Share of the sun that cards and sheets get of what reaches them: leaves of one card shade each other.
+    pub sunlit: f32,
     /// Its triangles, material by material: they follow each other in the index section.
     pub draws: Vec<Draw>,
     /// Tubes of thick branches.
@@ -93,7 +97,7 @@ pub struct VertexRecord {
     pub phase: u16,
     /// Unit normal, as [`forest_points::record::encode_axis`] has it.
     pub normal: [u8; 2],
-    /// Share of light that comes through the leaves around, 0 … 255.
+    /// Share of the sky that is seen from there, 0 … 255.
     pub openness: u8,
     /// 255 if it turns like a leaf, 0 if it does not.
     pub flutter: u8,

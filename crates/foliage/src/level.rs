@@ -1,12 +1,12 @@
 //! One level: thick branches, sheets of thin ones, cards of leaves.
 
-use crate::density::Density;
 use crate::header::WoodWay;
 use crate::leaf::{Card, Leaf, cards, clusters};
 use crate::mesh::Mesh;
 use crate::panel::Panel;
 use crate::sheet::sheets;
 use crate::thick::{WoodErrors, thick};
+use crate::visible::Visible;
 use crate::wood::Wood;
 use forest_raster::Surfaces;
 use forest_soup::TriangleSoup;
@@ -19,9 +19,8 @@ pub(crate) struct Tree<'a> {
     pub(crate) surfaces: &'a Surfaces,
     pub(crate) wood: &'a Wood,
     pub(crate) leaves: &'a [Leaf],
-    pub(crate) density: &'a Density,
-    /// Mean visible area of each triangle of the soup.
-    pub(crate) visible: &'a [f64],
+    /// What is seen of the soup.
+    pub(crate) visible: &'a Visible,
 }
 
 /// A panel in the tree.
@@ -56,6 +55,9 @@ const SMALL_GROUP: f64 = 12.0;
 /// Extent in texels of what lies on one card.
 pub(crate) const CARD: f64 = 16.0;
 
+/// Texels before a panel in which its own leaves lie.
+const OWN: f64 = 0.5 * CARD;
+
 /// What is seen of less than this many texels is left out.
 const UNSEEN: f64 = 1.0;
 
@@ -65,7 +67,7 @@ impl Tree<'_> {
         let Self { soup, surfaces, wood, .. } = *self;
         let groups = wood.groups(THIN * texel);
         let is_seen = |triangles: &[u32]| {
-            triangles.iter().map(|&i| self.visible[i as usize]).sum::<f64>()
+            triangles.iter().map(|&i| self.visible.areas[i as usize]).sum::<f64>()
                 >= UNSEEN * texel * texel
         };
         let mut hidden = 0;
@@ -80,7 +82,12 @@ impl Tree<'_> {
                 None => hidden += 1,
             }
         }
-        let (mesh, way, errors) = thick(soup, surfaces, wood, &which, texel);
+        let (mut mesh, way, errors) = thick(soup, surfaces, wood, &which, texel);
+        // A texel before the surface, as that is not quite the source's.
+        mesh.vertices.par_iter_mut().for_each(|v| {
+            let before = v.position + v.normal * texel;
+            v.skylit = self.visible.skylit(before, v.normal, texel);
+        });
         let mut twigs: Vec<Leaf> = Vec::new();
         let mut large: Vec<(u32, Vec<u32>)> = Vec::new();
         for (g, triangles) in (0u32..).zip(thin).filter(|(_, t)| !t.is_empty()) {
@@ -99,7 +106,7 @@ impl Tree<'_> {
             sheets(soup, surfaces, &triangles, texel).into_iter().map(move |panel| Placed {
                 on,
                 pivot: None,
-                openness: self.density.openness(panel.center),
+                openness: self.openness(&panel),
                 panel,
             })
         });
@@ -135,6 +142,15 @@ impl Tree<'_> {
         }
     }
 
+    /// Share of the sky that a panel sees: its middle, and halfway to its corners.
+    fn openness(&self, panel: &Panel) -> f64 {
+        let half = panel.half() * 0.5;
+        let at =
+            |x: f64, y: f64| panel.center + panel.axes * DVec3::new(x * half.x, y * half.y, 0.0);
+        let places = [at(0.0, 0.0), at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)];
+        self.visible.openness(&places, OWN * panel.texel)
+    }
+
     /// Cards of leaves and twigs.
     fn cards(&self, twigs: Vec<Leaf>, texel: f64) -> Vec<Placed> {
         let mut all = self.leaves.to_vec();
@@ -148,7 +164,7 @@ impl Tree<'_> {
             let weighted =
                 card.leaves.iter().map(|&i| all[i as usize].pivot * all[i as usize].area);
             let pivot = weighted.sum::<DVec3>() / area.max(f64::MIN_POSITIVE);
-            let openness = self.density.openness(panel.center);
+            let openness = self.openness(&panel);
             Some(Placed { on: main_branch(&all, card), pivot: Some(pivot), openness, panel })
         });
         placed.collect()

@@ -39,9 +39,9 @@
 mod bake;
 mod block;
 mod branch;
-mod density;
 mod dictionary;
 mod error;
+mod fit;
 mod header;
 mod leaf;
 mod level;

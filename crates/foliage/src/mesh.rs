@@ -17,6 +17,8 @@ pub(crate) struct Vertex {
     pub(crate) color: [f32; 4],
     /// The branch that moves it.
     pub(crate) on: OnBranch,
+    /// Share of the sky that it sees.
+    pub(crate) skylit: f64,
 }
 
 /// Triangles with materials of the source.

@@ -22,6 +22,9 @@ pub struct Sway {
 /// heights.
 pub const USUAL_LIMBER: f32 = 0.06;
 
+/// Vertices that are asked how they move, at most.
+const ASKED: usize = 2000;
+
 /// No top moves farther, in heights.
 pub const MOST_LEAN: f32 = 0.12;
 
@@ -36,12 +39,13 @@ impl Sway {
         Self { foot, lean: lean / height.max(f32::MIN_POSITIVE) }
     }
 
-    /// The mean of what the vertices of the coarsest level do; the foot is about the block's origin.
+    /// The mean of what vertices of the finest level do; the foot is about the block's origin.
     pub fn of(block: &FoliageBlock, posed: &Posed) -> Self {
         let [min, max] = block.header.bounds;
         let foot = min[1] as f32;
         let (mut sum, mut weight) = (Vec2::ZERO, 0.0);
-        for v in *block.vertices.last().expect("a level") {
+        let all = block.vertices[0];
+        for v in all.iter().step_by(all.len().div_ceil(ASKED).max(1)) {
             let p = Vec3::from(v.position);
             let square = (p.y - foot).max(0.0).powi(2);
             let moved = posed.place(block, v).0 - p;

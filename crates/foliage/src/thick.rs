@@ -86,6 +86,7 @@ fn vertex(soup: &TriangleSoup, v: usize, on: OnBranch) -> Vertex {
         uv: soup.uvs.get(v).map_or(DVec2::ZERO, |uv| uv.as_dvec2()),
         color: soup.colors.get(v).copied().unwrap_or([1.0; 4]),
         on,
+        skylit: 1.0,
     }
 }
 

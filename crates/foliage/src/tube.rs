@@ -93,6 +93,7 @@ pub(crate) fn tube(
                 uv: texture.at(branch.along[i], angle),
                 color,
                 on: OnBranch { branch: number, at: branch.along[i] },
+                skylit: 1.0,
             });
         }
     }

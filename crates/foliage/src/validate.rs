@@ -42,6 +42,12 @@ pub(crate) fn validate_header(h: &FoliageHeader) -> Result<(), String> {
         if !is_length(level.texel) || !coarser {
             return Err(format!("level {l} has texels of {}; they must grow", level.texel));
         }
+        if level.wood_vertices > level.vertices || !(0.0..=2.0).contains(&level.sunlit) {
+            let (wood, all, sunlit) = (level.wood_vertices, level.vertices, level.sunlit);
+            return Err(format!(
+                "level {l}: {wood} of {all} vertices are wood; cards get {sunlit} of the sun"
+            ));
+        }
         if level.triangles() > u64::from(u32::MAX) {
             return Err(format!("level {l} has {} triangles; below 2³²", level.triangles()));
         }

@@ -7,37 +7,81 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Directions from which is looked.
-const VIEWS: u32 = 12;
+const VIEWS: u32 = 24;
 
 /// Pixels across a picture.
 const SIDE: u32 = 512;
 
-/// Mean area of each triangle that is seen, over directions that fill the sphere evenly, in square
-/// world units of the picture plane.
-pub(crate) fn visible_areas(soup: &TriangleSoup) -> Vec<f64> {
-    let (painted, surfaces) = painted(soup);
-    let bounds = painted.bounds();
-    let (middle, reach) = (painted.origin + bounds.center(), bounds.half_diagonal());
-    let mut out = vec![0.0; soup.triangles.len()];
-    let pixel = 2.0 * reach / f64::from(SIDE);
-    for i in 0..VIEWS {
-        // A spiral on the sphere (R. Swinbank, R. J. Purser 2006).
-        let y = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(VIEWS);
-        let turn = f64::from(i) * PI * (3.0 - 5.0f64.sqrt());
-        let flat = (1.0 - y * y).sqrt();
-        let from = DVec3::new(flat * turn.cos(), y, flat * turn.sin());
-        let projection = Projection::Orthographic { height: 2.0 * reach };
-        let camera = Camera::new(middle + from * (2.0 * reach), -from, projection, [SIDE; 2]);
-        let style = Style { sampling: Sampling::MIDDLE, light: Light::Albedo };
-        let picture = rasterize(&painted, &surfaces, &camera, &style);
-        for p in picture.pixels.iter().filter(|p| p[3] > 0.0) {
-            let code = [0, 1, 2].map(|k| (p[k] * 255.0).round() as usize);
-            if let Some(area) = out.get_mut(code[0] << 16 | code[1] << 8 | code[2]) {
-                *area += pixel * pixel / f64::from(VIEWS);
+/// What is seen of a soup from all around.
+pub(crate) struct Visible {
+    /// Mean area of each triangle that is seen, over directions that fill the sphere evenly, in square
+    /// world units of the picture plane.
+    pub(crate) areas: Vec<f64>,
+    /// Cameras, and depths of what they see first; infinite where there is nothing.
+    depths: Vec<(Camera, Vec<f32>)>,
+    /// World position of the soup's zero.
+    origin: DVec3,
+}
+
+impl Visible {
+    pub(crate) fn of(soup: &TriangleSoup) -> Self {
+        let (painted, surfaces) = painted(soup);
+        let bounds = painted.bounds();
+        let (middle, reach) = (painted.origin + bounds.center(), bounds.half_diagonal());
+        let mut out = Self {
+            areas: vec![0.0; soup.triangles.len()],
+            depths: Vec::new(),
+            origin: soup.origin,
+        };
+        let pixel = 2.0 * reach / f64::from(SIDE);
+        for i in 0..VIEWS {
+            // A spiral on the sphere (R. Swinbank, R. J. Purser 2006).
+            let y = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(VIEWS);
+            let turn = f64::from(i) * PI * (3.0 - 5.0f64.sqrt());
+            let flat = (1.0 - y * y).sqrt();
+            let from = DVec3::new(flat * turn.cos(), y, flat * turn.sin());
+            let projection = Projection::Orthographic { height: 2.0 * reach };
+            let camera = Camera::new(middle + from * (2.0 * reach), -from, projection, [SIDE; 2]);
+            let style = Style { sampling: Sampling::MIDDLE, light: Light::Albedo };
+            let picture = rasterize(&painted, &surfaces, &camera, &style);
+            for p in picture.pixels.iter().filter(|p| p[3] > 0.0) {
+                let code = [0, 1, 2].map(|k| (p[k] * 255.0).round() as usize);
+                if let Some(area) = out.areas.get_mut(code[0] << 16 | code[1] << 8 | code[2]) {
+                    *area += pixel * pixel / f64::from(VIEWS);
+                }
+            }
+            out.depths.push((camera, picture.depth));
+        }
+        out
+    }
+
+    /// Share of the sky, cosine-weighted, that a surface of this unit normal sees at `p` (about the soup's
+    /// origin); what is less than `bias` before it hides nothing.
+    pub(crate) fn skylit(&self, p: DVec3, normal: DVec3, bias: f64) -> f64 {
+        let (mut seen, mut all) = (0.0, 0.0);
+        for (camera, depths) in &self.depths {
+            let cos = -camera.forward.dot(normal);
+            if cos > 0.0 {
+                all += cos;
+                seen += cos * f64::from(u8::from(self.is_seen(camera, depths, p, bias)));
             }
         }
+        if all > 0.0 { seen / all } else { 1.0 }
     }
-    out
+
+    fn is_seen(&self, camera: &Camera, depths: &[f32], p: DVec3, bias: f64) -> bool {
+        let (x, y, depth) = camera.project(self.origin + p);
+        let inside = |v: f64| (v.max(0.0) as usize).min(SIDE as usize - 1);
+        depth - bias < f64::from(depths[inside(y) * SIDE as usize + inside(x)])
+    }
+
+    /// Share of all directions from which places (about the soup's origin) are seen, in the mean; what
+    /// is less than `bias` before them hides nothing.
+    pub(crate) fn openness(&self, places: &[DVec3], bias: f64) -> f64 {
+        let all = self.depths.iter().flat_map(|(c, d)| places.iter().map(move |p| (c, d, *p)));
+        let count = (self.depths.len() * places.len()).max(1);
+        all.filter(|(c, d, p)| self.is_seen(c, d, *p, bias)).count() as f64 / count as f64
+    }
 }
 
 /// The soup with each triangle in the colour of its number, with the holes of its textures.
@@ -95,9 +139,13 @@ mod tests {
             materials: vec![Material::default()],
             ..TriangleSoup::default()
         };
-        let areas = visible_areas(&soup);
+        let visible = Visible::of(&soup);
+        let areas = &visible.areas;
         // Each large one shows half of its area in the mean over one side's directions: a quarter over all.
         assert!((areas[0] + areas[1] - 4.0).abs() < 0.5, "{areas:?}");
         assert!(areas[2] + areas[3] < 0.02, "{areas:?}");
+        // From its middle little of the sky is seen; from above, all but what they cover.
+        let open = |z: f64| visible.openness(&[DVec3::new(0.0, 0.0, z)], 0.02);
+        assert!(open(0.0) < 0.15 && (0.9..1.0).contains(&open(5.0)), "{} {}", open(0.0), open(5.0));
     }
 }

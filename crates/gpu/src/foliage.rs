@@ -4,17 +4,22 @@ use crate::MOST_LAYERS;
 use crate::bind::{self, Kind};
 use crate::device::Gpu;
 use crate::error::GpuError;
-use crate::frame::Stage;
+use crate::frame::{FrameUniform, Stage};
 use crate::materials::MaterialTables;
 use crate::shader::Shader;
+use crate::target::{COLOR, DEPTH};
 use bytemuck::{Pod, Zeroable};
-use forest_foliage::{BranchPose, FoliageBlock, Posed, VertexRecord, Wind};
+use forest_foliage::{BranchPose, FoliageBlock, LevelHeader, Posed, VertexRecord, Wind};
 use forest_pack::Pack;
 use forest_points::UvRange;
+use forest_raster::{Light, SHADOW_BIAS, SHADOW_SIDE, sun_camera};
 use forest_soup::Camera;
+use glam::DVec3;
 use wgpu::{
-    BindGroup, BindGroupLayout, BindingResource, Buffer, BufferUsages, PrimitiveTopology,
-    RenderPass, RenderPipeline, ShaderStages, Texture, TextureFormat, TextureViewDescriptor,
+    BindGroup, BindGroupLayout, BindingResource, Buffer, BufferUsages, Color, CommandEncoder,
+    LoadOp, Operations, PrimitiveTopology, RenderPass, RenderPassColorAttachment,
+    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPipeline, ShaderStages, StoreOp,
+    Texture, TextureFormat, TextureView, TextureViewDescriptor,
 };
 
 /// `Foliage` of foliage.wgsl.
@@ -29,7 +34,42 @@ struct FoliageUniform {
     flutter: f32,
     swing: f32,
     windy: u32,
-    zero: u32,
+    sunlit: f32,
+    turning: [f32; 3],
+    zero1: u32,
+}
+
+/// `SunView` of foliage.wgsl.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct SunViewUniform {
+    eye: [f32; 3],
+    scale: f32,
+    right: [f32; 3],
+    side: f32,
+    down: [f32; 3],
+    bias: f32,
+    forward: [f32; 3],
+    near: f32,
+    range: f32,
+    zero: [f32; 3],
+}
+
+/// A shadow map for each layer, and what its pass binds.
+#[derive(Debug)]
+struct Shadow {
+    /// Depths along the sun's axis, in two parts.
+    maps: [TextureView; MOST_LAYERS],
+    /// For the depth test.
+    test: TextureView,
+    /// The sun's camera: `Frame` of common.wgsl, and `SunView`.
+    frame: Buffer,
+    view: Buffer,
+    frame_group: BindGroup,
+    uniforms: [Buffer; MOST_LAYERS],
+    groups: [BindGroup; MOST_LAYERS],
+    /// A sun is there in this frame.
+    drawn: bool,
 }
 
 /// The foliage of a pack on a device, and what a frame needs of it.
@@ -41,6 +81,7 @@ pub(crate) struct FoliageModel<'p> {
     uniforms: [Buffer; MOST_LAYERS],
     poses: Buffer,
     groups: [BindGroup; MOST_LAYERS],
+    shadow: Shadow,
     /// Levels of the last frame.
     layers: Vec<usize>,
 }
@@ -71,9 +112,21 @@ impl<'p> FoliageModel<'p> {
         let poses = gpu.buffer("poses of branches", bytes, BufferUsages::STORAGE)?;
         let size = size_of::<FoliageUniform>() as u64;
         let uniform = || gpu.buffer("foliage", size, BufferUsages::UNIFORM);
-        let uniforms = [uniform()?, uniform()?];
+        let (uniforms, shadow_uniforms) = ([uniform()?, uniform()?], [uniform()?, uniform()?]);
         let dictionary = dictionary.create_view(&TextureViewDescriptor::default());
-        let groups = [0, 1].map(|slot| {
+        let target = |what, format| gpu.render_target(what, [SHADOW_SIDE; 2], format);
+        let map = || target("shadow map", COLOR);
+        let maps = [map()?, map()?];
+        let test = target("depth of a shadow map", DEPTH)?;
+        // A pass cannot read what it writes.
+        let nothing = gpu.texture("no shadow map", [4, 4], 1, COLOR)?;
+        let nothing = nothing.create_view(&TextureViewDescriptor::default());
+        let size = |size| size as u64;
+        let frame = size(size_of::<FrameUniform>());
+        let frame = gpu.buffer("frame of a shadow map", frame, BufferUsages::UNIFORM)?;
+        let view = size(size_of::<SunViewUniform>());
+        let view = gpu.buffer("sun's view", view, BufferUsages::UNIFORM)?;
+        let group = |uniform: &Buffer, map: &TextureView| {
             let all = [
                 vertices.as_entire_binding(),
                 indices.as_entire_binding(),
@@ -82,13 +135,30 @@ impl<'p> FoliageModel<'p> {
                 branches.as_entire_binding(),
                 BindingResource::TextureView(&tables.sheet),
                 poses.as_entire_binding(),
-                uniforms[slot].as_entire_binding(),
+                uniform.as_entire_binding(),
                 BindingResource::TextureView(&dictionary),
+                view.as_entire_binding(),
+                BindingResource::TextureView(map),
             ];
             bind::group(&gpu.device, "foliage", &pass.layout, &all)
-        });
+        };
+        let groups = [0, 1].map(|slot| group(&uniforms[slot], &maps[slot]));
+        let shadow_groups = [0, 1].map(|slot| group(&shadow_uniforms[slot], &nothing));
+        let frame_layout = &pass.frame_layout;
+        let frame_group =
+            bind::group(&gpu.device, "sun", frame_layout, &[frame.as_entire_binding()]);
+        let shadow = Shadow {
+            maps,
+            test,
+            frame,
+            view,
+            frame_group,
+            uniforms: shadow_uniforms,
+            groups: shadow_groups,
+            drawn: false,
+        };
         let layers = Vec::with_capacity(MOST_LAYERS);
-        Ok(Self { block, firsts, uniforms, poses, groups, layers })
+        Ok(Self { block, firsts, uniforms, poses, groups, shadow, layers })
     }
 
     pub(crate) fn stage(&self) -> Stage {
@@ -102,9 +172,23 @@ impl<'p> FoliageModel<'p> {
         gpu: &Gpu,
         camera: &Camera,
         wind: &Wind,
+        light: &Light,
         layers: impl Iterator<Item = (usize, [f32; 2])>,
     ) {
         self.layers.clear();
+        let from_eye = |eye: DVec3| (self.block.origin() - eye).as_vec3().to_array();
+        let sun = match light {
+            Light::Sun(sun) => Some(sun_camera(self.block.bounds(), sun.to_sun)),
+            Light::Albedo => None,
+        };
+        self.shadow.drawn = sun.is_some();
+        if let Some(sun) = &sun {
+            let stage = self.stage();
+            let frame = FrameUniform::new(sun, &Light::Albedo, &stage);
+            gpu.queue.write_buffer(&self.shadow.frame, 0, bytemuck::bytes_of(&frame));
+            let view = sun_view(sun, camera, stage.half_diagonal, frame.range());
+            gpu.queue.write_buffer(&self.shadow.view, 0, bytemuck::bytes_of(&view));
+        }
         let posed = Posed::new(&self.block, wind, 0.0, camera.eye);
         let poses = &posed.pose().branches;
         gpu.queue.write_buffer(&self.poses, 0, bytemuck::cast_slice(poses));
@@ -112,7 +196,7 @@ impl<'p> FoliageModel<'p> {
         for (slot, (level, fade)) in layers.take(MOST_LAYERS).enumerate() {
             let [first_vertex, first_triangle] = self.firsts[level];
             let uniform = FoliageUniform {
-                origin: (self.block.origin() - camera.eye).as_vec3().to_array(),
+                origin: from_eye(camera.eye),
                 pivot_step: self.block.header.pivot_step as f32,
                 fade,
                 first_vertex,
@@ -120,14 +204,21 @@ impl<'p> FoliageModel<'p> {
                 flutter,
                 swing,
                 windy: (wind.strength > 0.0).into(),
-                zero: 0,
+                sunlit: self.block.header.levels[level].sunlit,
+                turning: from_eye(camera.eye),
+                zero1: 0,
             };
+            if let Some(sun) = &sun {
+                let own = FoliageUniform { origin: from_eye(sun.eye), fade: [0.0, 1.0], ..uniform };
+                let to = &self.shadow.uniforms[slot];
+                gpu.queue.write_buffer(to, 0, bytemuck::bytes_of(&own));
+            }
             gpu.queue.write_buffer(&self.uniforms[slot], 0, bytemuck::bytes_of(&uniform));
             self.layers.push(level);
         }
     }
 
-    fn levels(&self) -> impl Iterator<Item = &forest_foliage::LevelHeader> {
+    fn levels(&self) -> impl Iterator<Item = &LevelHeader> {
         self.layers.iter().map(|l| &self.block.header.levels[*l])
     }
 
@@ -145,6 +236,27 @@ impl<'p> FoliageModel<'p> {
     /// Draw calls of the last frame.
     pub(crate) fn calls(&self) -> u64 {
         self.levels().map(|l| l.draws.len() as u64).sum()
+    }
+}
+
+fn sun_view(
+    sun: &Camera,
+    camera: &Camera,
+    half_diagonal: f64,
+    [near, range]: [f32; 2],
+) -> SunViewUniform {
+    let vector = |v: DVec3| v.as_vec3().to_array();
+    SunViewUniform {
+        eye: vector(sun.eye - camera.eye),
+        scale: sun.pixels_per_unit(1.0) as f32,
+        right: vector(sun.right),
+        side: SHADOW_SIDE as f32,
+        down: vector(-sun.up),
+        bias: (SHADOW_BIAS * half_diagonal) as f32,
+        forward: vector(sun.forward),
+        near,
+        range,
+        zero: [0.0; 3],
     }
 }
 
@@ -166,36 +278,78 @@ fn dictionary(gpu: &Gpu, block: &FoliageBlock) -> Result<Texture, GpuError> {
 #[derive(Debug)]
 pub(crate) struct FoliagePass {
     layout: BindGroupLayout,
+    frame_layout: BindGroupLayout,
     pipeline: RenderPipeline,
+    shadow: RenderPipeline,
 }
 
 impl FoliagePass {
     pub(crate) fn new(gpu: &Gpu, frame_layout: &BindGroupLayout) -> Self {
         let device = &gpu.device;
         let r = Kind::Read;
-        let kinds = [r, r, r, r, r, Kind::TextureArray, r, Kind::Uniform, Kind::Texture];
+        let (u, t) = (Kind::Uniform, Kind::Texture);
+        let kinds = [r, r, r, r, r, Kind::TextureArray, r, u, t, u, t];
         let layout = bind::layout(device, "foliage", ShaderStages::VERTEX_FRAGMENT, &kinds);
-        let pipeline = crate::pipeline::opaque(
-            device,
-            &Shader::Foliage.module(device),
-            &crate::pipeline::layout(device, &[frame_layout, &layout]),
-            ["vertex", "fragment"],
-            PrimitiveTopology::TriangleList,
-        );
-        Self { layout, pipeline }
+        let module = Shader::Foliage.module(device);
+        let both = crate::pipeline::layout(device, &[frame_layout, &layout]);
+        let list = PrimitiveTopology::TriangleList;
+        let pipeline =
+            crate::pipeline::opaque(device, &module, &both, ["vertex", "fragment"], list);
+        let entries = ["vertex", "shadow_fragment"];
+        let shadow = crate::pipeline::opaque(device, &module, &both, entries, list);
+        Self { layout, frame_layout: frame_layout.clone(), pipeline, shadow }
+    }
+
+    /// Draws what the sun sees of each layer, if there is a sun.
+    pub(crate) fn shade(&self, encoder: &mut CommandEncoder, model: &FoliageModel) {
+        let shadow = &model.shadow;
+        if !shadow.drawn {
+            return;
+        }
+        // Beyond the range, where nothing is.
+        let far = Color { r: 2.0, ..Color::BLACK };
+        for (slot, level) in model.levels().enumerate() {
+            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                label: Some("shadow map"),
+                color_attachments: &[Some(RenderPassColorAttachment {
+                    view: &shadow.maps[slot],
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: Operations { load: LoadOp::Clear(far), store: StoreOp::Store },
+                })],
+                depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
+                    view: &shadow.test,
+                    depth_ops: Some(Operations {
+                        load: LoadOp::Clear(0.0),
+                        store: StoreOp::Discard,
+                    }),
+                    stencil_ops: None,
+                }),
+                timestamp_writes: None,
+                occlusion_query_set: None,
+                multiview_mask: None,
+            });
+            pass.set_bind_group(0, &shadow.frame_group, &[]);
+            pass.set_pipeline(&self.shadow);
+            draw_level(&mut pass, level, &shadow.groups[slot]);
+        }
     }
 
     pub(crate) fn draw(&self, pass: &mut RenderPass, model: &FoliageModel) {
         pass.set_pipeline(&self.pipeline);
         for (slot, level) in model.levels().enumerate() {
-            pass.set_bind_group(1, &model.groups[slot], &[]);
-            let mut first = 0;
-            for draw in &level.draws {
-                let end = first + 3 * draw.triangles;
-                let material = u32::from(draw.material);
-                pass.draw(first..end, material..material + 1);
-                first = end;
-            }
+            draw_level(pass, level, &model.groups[slot]);
         }
+    }
+}
+
+fn draw_level(pass: &mut RenderPass, level: &LevelHeader, group: &BindGroup) {
+    pass.set_bind_group(1, group, &[]);
+    let mut first = 0;
+    for draw in &level.draws {
+        let end = first + 3 * draw.triangles;
+        let material = u32::from(draw.material);
+        pass.draw(first..end, material..material + 1);
+        first = end;
     }
 }

@@ -135,6 +135,11 @@ impl FrameUniform {
         Self { lean: sway.lean.to_array(), foot, ..self }
     }
 
+    /// Of a parallel camera: the depth that is 1 in the depth buffer, and the range behind it.
+    pub(crate) fn range(&self) -> [f32; 2] {
+        [self.depth[0], 1.0 / self.depth[1]]
+    }
+
     /// With another nearest distance.
     pub(crate) fn with_near(self, near: f64) -> Self {
         Self { near: near as f32, ..self }

@@ -147,6 +147,9 @@ impl Renderer {
         if let Some(points) = points {
             self.points.splat(encoder, &self.group, points, target);
         }
+        if let Some(foliage) = foliage {
+            self.foliage.shade(encoder, foliage);
+        }
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("tree"),
             color_attachments: &[Some(RenderPassColorAttachment {
@@ -223,7 +226,7 @@ fn prepare(
             _ => None,
         });
         if chosen.clone().next().is_some() {
-            model.prepare(gpu, &frame.camera, &frame.wind, chosen);
+            model.prepare(gpu, &frame.camera, &frame.wind, &frame.light, chosen);
             drawn.triangles += model.triangles();
             drawn.bytes += model.bytes();
             drawn.calls += model.calls();

@@ -79,7 +79,7 @@ impl Shader {
             }
             Self::Foliage => {
                 let wind = include_str!("wgsl/wind.wgsl");
-                &[COMMON, LIT_BLOCK, SURFACE, wind, include_str!("wgsl/foliage.wgsl")]
+                &[COMMON, SURFACE, wind, include_str!("wgsl/foliage.wgsl")]
             }
             Self::Views => &[COMMON, LIT_BLOCK, TILE, include_str!("wgsl/views.wgsl")],
             Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],

@@ -52,6 +52,31 @@ impl Gpu {
         }))
     }
 
+    /// A view of a texture that is drawn into, and read.
+    ///
+    /// # Errors
+    /// When it is larger than the device takes.
+    pub(crate) fn render_target(
+        &self,
+        what: &str,
+        [width, height]: [u32; 2],
+        format: TextureFormat,
+    ) -> Result<TextureView, GpuError> {
+        let limit = self.device.limits().max_texture_dimension_2d;
+        self.within(what, width.max(height).into(), "texels a side", limit.into())?;
+        let texture = self.device.create_texture(&TextureDescriptor {
+            label: Some(what),
+            size: Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format,
+            usage: TextureUsages::TEXTURE_BINDING | TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        });
+        Ok(texture.create_view(&TextureViewDescriptor::default()))
+    }
+
     /// Writes texels, or rows of blocks, into a box of one or more layers from `origin` on.
     pub(crate) fn write_texels(
         &self,

@@ -66,6 +66,7 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
             alpha_mode,
             double_sided: m.double_sided,
             unlit: m.unlit,
+            scattered: false,
         });
     }
     let texels = |t: &TextureHeader| u64::from(t.width) * u64::from(t.height);

@@ -11,7 +11,7 @@ use crate::picture::{Picture, PixelMean};
 use crate::sampling::{Pattern, Sampling};
 use crate::sprite::{Sprite, SpriteHit};
 use forest_soup::{Camera, Projection};
-use glam::{IVec2, Vec3};
+use glam::IVec2;
 use rayon::prelude::*;
 
 /// How a picture is made.
@@ -30,7 +30,7 @@ impl Default for Style {
     }
 }
 
-/// Draws `list` as `camera` sees it, without shadows.
+/// Draws `list` as `camera` sees it; shadows are those of the list's map.
 pub fn draw(list: &DisplayList, camera: &Camera, style: &Style) -> Picture {
     let canvas = Canvas {
         list,
@@ -39,6 +39,7 @@ pub fn draw(list: &DisplayList, camera: &Camera, style: &Style) -> Picture {
         parallel: matches!(camera.projection, Projection::Orthographic { .. }),
         width: camera.width,
         height: camera.height,
+        camera,
     };
     canvas.picture()
 }
@@ -56,6 +57,7 @@ struct Canvas<'a> {
     parallel: bool,
     width: u32,
     height: u32,
+    camera: &'a Camera,
 }
 
 /// Samples of a few rows of pixels.
@@ -223,7 +225,7 @@ impl Canvas<'_> {
                 let (px, py) = (f64::from(x) + f64::from(xs[s]), f64::from(y) + f64::from(ys[s]));
                 let f = self.fragment(ids[s], px, py, self.pattern.grid(x, y, s));
                 let depth = if self.parallel { keys[s] } else { -1.0 / keys[s] };
-                let [r, g, b] = f.lit(&self.light);
+                let [r, g, b] = self.lit(f, px, py, depth);
                 mean.add([r, g, b, 1.0], depth, f.normal.to_array(), share);
             }
             mean.store(&mut out, p);
@@ -231,37 +233,37 @@ impl Canvas<'_> {
         out
     }
 
+    /// The colour of what is seen at picture coordinates (x, y) in this depth.
+    fn lit(&self, f: Fragment, x: f64, y: f64, depth: f32) -> [f32; 3] {
+        let Light::Sun(sun) = &self.light else { return f.rgb };
+        if f.unlit {
+            return f.rgb;
+        }
+        let mut sunlit = f.sunlit;
+        let place = || self.camera.unproject(x, y, f64::from(depth));
+        if let (Some(map), true) = (&self.list.shadow, f.shadowed) {
+            sunlit *= map.seen(place());
+        }
+        let factors = match f.scattered {
+            true => sun.scattered(self.camera.to_eye(place()), sunlit, f.sky),
+            false => sun.factors(f.normal, sunlit, f.sky),
+        };
+        std::array::from_fn(|k| f.rgb[k] * factors[k])
+    }
+
     fn fragment(&self, i: u32, x: f64, y: f64, grid: (u32, u32)) -> Fragment {
         match self.list.thing(i) {
             Thing::Triangle(t) => t.shade(x, y),
             // An ellipse comes lit.
-            Thing::Ellipse(e) => {
-                Fragment { rgb: e.rgb, normal: e.normal, unlit: true, sunlit: 1.0, sky: 1.0 }
-            }
+            Thing::Ellipse(e) => Fragment { normal: e.normal, ..Fragment::unlit(e.rgb) },
             Thing::Sprite(s) => match s.sample(x, y, grid) {
                 Some(SpriteHit { rgb, normal, sunlit, sky, .. }) => {
-                    Fragment { rgb, normal, unlit: false, sunlit, sky }
+                    Fragment { normal, unlit: false, sunlit, sky, ..Fragment::unlit(rgb) }
                 }
                 // The same answer as before: it was a hit.
-                None => Fragment {
-                    rgb: [0.0; 3],
-                    normal: Vec3::ZERO,
-                    unlit: true,
-                    sunlit: 1.0,
-                    sky: 1.0,
-                },
+                None => Fragment::unlit([0.0; 3]),
             },
         }
-    }
-}
-
-impl Fragment {
-    fn lit(&self, light: &Light) -> [f32; 3] {
-        if self.unlit {
-            return self.rgb;
-        }
-        let factors = light.factors(self.normal, self.sunlit, self.sky);
-        std::array::from_fn(|k| self.rgb[k] * factors[k])
     }
 }
 

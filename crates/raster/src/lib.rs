@@ -4,7 +4,7 @@
 //! agree sample by sample:
 //!
 //! * [`rasterize`], scanlines: the fast way, for base colours, depth, normals and light without
-//!   shadows. What sweeps and view bakes use.
+//!   shadows ([`rasterize_shadowed`]: with those of a shadow map). What sweeps and view bakes use.
 //! * [`RayScene`], rays through a bounding volume hierarchy (the library `obvhs`): slower, and the
 //!   only way to shadows and a hidden sky. What lit truths use, and what checks the scanlines.
 //!
@@ -57,6 +57,7 @@ mod picture;
 mod plane;
 mod rays;
 mod sampling;
+mod shadow;
 mod sprite;
 mod surface;
 mod trace;
@@ -66,12 +67,13 @@ pub use capture::{Buffers, Capture, CaptureScene, DeepHit, DeepPicture, Skylight
 pub use composite::{Layer, composite};
 pub use grove::{Grove, Kind, Planted};
 pub use layers::{LayerHit, layers};
-pub use light::{Light, Sun};
+pub use light::{Light, Sun, scattered};
 pub use list::{Corner, DisplayList, Ellipse, Projector};
-pub use mesh::rasterize;
+pub use mesh::{rasterize, rasterize_shadowed};
 pub use opacity::{covers, sample_hash};
 pub use picture::Picture;
 pub use rays::RayScene;
 pub use sampling::Sampling;
+pub use shadow::{SHADOW_BIAS, SHADOW_SIDE, ShadowMap, sun_camera};
 pub use sprite::{Sprite, SpriteHit};
 pub use surface::Surfaces;

@@ -1,6 +1,7 @@
 //! Light on surfaces: none, or a sun and a sky.
 
 use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// What a picture shows of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -78,6 +79,13 @@ impl Sun {
         1.0 - 0.5 * (z + 1.0) * (1.0 - self.darkest)
     }
 
+    /// Factors on the base colour of leaves that face all ways, seen along a unit vector to the eye.
+    pub(crate) fn scattered(&self, to_eye: DVec3, sunlit: f32, skylit: f32) -> [f32; 3] {
+        let cos = to_eye.dot(self.to_sun);
+        let direct = scattered(cos, f64::from(self.translucency)) as f32 * sunlit;
+        std::array::from_fn(|k| self.sun[k] * direct + self.sky[k] * skylit)
+    }
+
     /// Factors on the base colour where `sunlit` of the sun and `skylit` of the sky is seen.
     pub(crate) fn factors(&self, normal: Vec3, sunlit: f32, skylit: f32) -> [f32; 3] {
         let cos = normal.dot(self.to_sun.as_vec3());
@@ -86,9 +94,43 @@ impl Sun {
     }
 }
 
+/// What leaves that face all ways alike give back of light from `cosine` to the direction in which they are
+/// seen, over a leaf that faces both: the mean of max(n·l, 0) + t·max(−n·l, 0) over normals n turned to the
+/// eye, by their projected area n·v (J. K. Shultis, R. B. Myneni, "Radiative transfer in vegetation canopies
+/// with anisotropic scattering", J. Quant. Spectrosc. Radiat. Transfer 39 (1988), for uniform normals).
+/// The light of impostors, whose texels hold many leaves: impostor.wgsl has it too.
+pub fn scattered(cosine: f64, translucency: f64) -> f64 {
+    let c = cosine.clamp(-1.0, 1.0);
+    let (angle, s) = (c.acos(), (1.0 - c * c).sqrt());
+    2.0 / (3.0 * PI) * (s + (PI - angle) * c + translucency * (s - angle * c))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn scattered_light_is_the_mean_over_leaves_that_face_all_ways() {
+        for degrees in [0.0f64, 30.0, 77.0, 90.0, 140.0, 180.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let (eye, light) = (DVec3::Y, DVec3::new(sin, cos, 0.0));
+            let (mut sum, mut weight) = (0.0, 0.0);
+            // Normals on a spiral: as many everywhere.
+            let count = 20_000;
+            for k in 0..count {
+                let y = 1.0 - (f64::from(k) + 0.5) * 2.0 / f64::from(count);
+                let (sin, cos) = (f64::from(k) * 2.399_963_229_728_653).sin_cos();
+                let flat = (1.0 - y * y).sqrt();
+                let mut n = DVec3::new(flat * cos, y, flat * sin);
+                n *= if n.dot(eye) < 0.0 { -1.0 } else { 1.0 };
+                let cosine = n.dot(light);
+                sum += n.dot(eye) * (cosine.max(0.0) + 0.6 * (-cosine).max(0.0));
+                weight += n.dot(eye);
+            }
+            let mean = sum / weight;
+            assert!((scattered(cos, 0.6) - mean).abs() < 1e-4, "{degrees}: {mean}");
+        }
+    }
 
     #[test]
     fn the_far_side_gets_what_shines_through() {

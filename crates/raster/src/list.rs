@@ -1,6 +1,7 @@
 //! What a canvas draws: triangles, ellipses and sprites, projected.
 
 use crate::plane::{Edges, Plane};
+use crate::shadow::ShadowMap;
 use crate::sprite::Sprite;
 use crate::surface::{Surface, Surfaces};
 use forest_soup::{Camera, Projection};
@@ -20,6 +21,8 @@ pub struct Corner {
     pub color: [f32; 4],
     /// Share of the sun that is estimated to be seen ([`crate::Sun::seen`]); 1 for all.
     pub sunlit: f32,
+    /// Share of the sky that is seen; 1 for all.
+    pub skylit: f32,
 }
 
 /// An ellipse in the picture plane, all at one depth: a point of a LOD, or a particle.
@@ -75,6 +78,7 @@ pub(crate) struct Triangle<'a> {
     /// Towards the eye.
     normals: [Vec3; 3],
     sunlit: [f32; 3],
+    skylit: [f32; 3],
     pub(crate) surface: &'a Surface,
 }
 
@@ -136,6 +140,7 @@ impl Corner {
             uv: self.uv.lerp(other.uv, f),
             color: std::array::from_fn(|k| self.color[k] + (other.color[k] - self.color[k]) * f),
             sunlit: self.sunlit + (other.sunlit - self.sunlit) * f,
+            skylit: self.skylit + (other.skylit - self.skylit) * f,
         }
     }
 }
@@ -147,6 +152,7 @@ pub struct DisplayList<'a> {
     pub(crate) triangles: Vec<Triangle<'a>>,
     pub(crate) ellipses: Vec<Ellipse>,
     pub(crate) sprites: Vec<Arc<dyn Sprite + 'a>>,
+    pub(crate) shadow: Option<Arc<ShadowMap>>,
 }
 
 impl<'a> DisplayList<'a> {
@@ -187,6 +193,11 @@ impl<'a> DisplayList<'a> {
         }
     }
 
+    /// Shades the triangles by a map.
+    pub fn shade(&mut self, map: Arc<ShadowMap>) {
+        self.shadow = Some(map);
+    }
+
     /// Adds another list after this one.
     pub fn append(&mut self, mut other: Self) {
         self.triangles.append(&mut other.triangles);
@@ -202,10 +213,22 @@ pub(crate) struct Fragment {
     /// Towards the eye.
     pub(crate) normal: Vec3,
     pub(crate) unlit: bool,
+    /// It faces all ways.
+    pub(crate) scattered: bool,
+    /// Shadow maps shade it.
+    pub(crate) shadowed: bool,
     /// Share of the sun that is seen from there.
     pub(crate) sunlit: f32,
     /// Share of the sky that is seen from there.
     pub(crate) sky: f32,
+}
+
+impl Fragment {
+    /// A colour as it is.
+    pub(crate) fn unlit(rgb: [f32; 3]) -> Self {
+        let (unlit, scattered, shadowed) = (true, false, false);
+        Self { rgb, normal: Vec3::ZERO, unlit, scattered, shadowed, sunlit: 1.0, sky: 1.0 }
+    }
 }
 
 impl<'a> Triangle<'a> {
@@ -250,6 +273,7 @@ impl<'a> Triangle<'a> {
             colors: (!plain).then(|| Box::new(corners.map(|c| c.color))),
             normals,
             sunlit: corners.map(|c| c.sunlit),
+            skylit: corners.map(|c| c.skylit),
             surface,
         })
     }
@@ -289,8 +313,10 @@ impl<'a> Triangle<'a> {
             rgb: self.surface.at(self.uv(w), self.tint(w)).0,
             normal: (a * w[0] + b * w[1] + c * w[2]).normalize_or_zero(),
             unlit: self.surface.is_unlit(),
+            scattered: self.surface.is_scattered(),
+            shadowed: true,
             sunlit: self.sunlit[0] * w[0] + self.sunlit[1] * w[1] + self.sunlit[2] * w[2],
-            sky: 1.0,
+            sky: self.skylit[0] * w[0] + self.skylit[1] * w[1] + self.skylit[2] * w[2],
         }
     }
 }

@@ -1,12 +1,14 @@
-//! A soup by scanlines: the fast way, without shadows.
+//! A soup by scanlines: the fast way, without shadows or with those of a map.
 
 use crate::canvas::{Style, draw};
 use crate::list::{Corner, DisplayList, Projector};
 use crate::picture::Picture;
+use crate::shadow::ShadowMap;
 use crate::surface::Surfaces;
 use forest_soup::{Camera, TriangleSoup};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Triangles that one task projects.
 const CHUNK: usize = 4096;
@@ -23,6 +25,22 @@ pub fn rasterize(
     style: &Style,
 ) -> Picture {
     draw(&display_list(soup, surfaces, camera), camera, style)
+}
+
+/// As [`rasterize`], with the shadows of a map.
+///
+/// # Panics
+/// If the soup breaks its own rules ([`TriangleSoup::validate`]).
+pub fn rasterize_shadowed(
+    soup: &TriangleSoup,
+    surfaces: &Surfaces,
+    camera: &Camera,
+    style: &Style,
+    map: Arc<ShadowMap>,
+) -> Picture {
+    let mut list = display_list(soup, surfaces, camera);
+    list.shade(map);
+    draw(&list, camera, style)
 }
 
 /// The soup as `camera` sees it; a triangle's id is its number in the soup.
@@ -58,7 +76,8 @@ pub(crate) fn corners(soup: &TriangleSoup, i: usize) -> [Corner; 3] {
             normal: soup.normals.get(v).copied().unwrap_or(Vec3::ZERO),
             uv: soup.uvs.get(v).copied().unwrap_or(Vec2::ZERO),
             color: soup.colors.get(v).copied().unwrap_or([1.0; 4]),
-            sunlit: 1.0,
+            sunlit: soup.sunlit.get(v).copied().unwrap_or(1.0),
+            skylit: soup.skylit.get(v).copied().unwrap_or(1.0),
         }
     })
 }

@@ -44,6 +44,10 @@ impl Surface {
         Self { material: material.clone(), texture, translucent }
     }
 
+    pub(crate) fn is_scattered(&self) -> bool {
+        self.material.scattered
+    }
+
     pub(crate) fn is_unlit(&self) -> bool {
         self.material.unlit
     }

@@ -11,7 +11,6 @@ use crate::land::Land;
 use crate::species::{Canopy, Stance};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::f64::consts::PI;
 
 /// Steps of stored optical depth for a depth of 1.
 pub const DEPTH_STEPS: f32 = 1024.0;
@@ -22,17 +21,6 @@ pub const DIFFUSE: f64 = 1.66;
 
 /// Lights are taken for at least this high above the horizon (sine of the elevation).
 pub const LOWEST_LIGHT: f64 = 0.1;
-
-/// What leaves that face all ways alike give back of light from `cosine` to the direction in which they are
-/// seen, over a leaf that faces both: the mean of max(n·l, 0) + t·max(−n·l, 0) over normals n turned to the
-/// eye, by their projected area n·v (J. K. Shultis, R. B. Myneni, "Radiative transfer in vegetation canopies
-/// with anisotropic scattering", J. Quant. Spectrosc. Radiat. Transfer 39 (1988), for uniform normals).
-/// The light of impostors, whose texels hold many leaves: impostor.wgsl has it too.
-pub fn foliage(cosine: f64, translucency: f64) -> f64 {
-    let c = cosine.clamp(-1.0, 1.0);
-    let (angle, s) = (c.acos(), (1.0 - c * c).sqrt());
-    2.0 / (3.0 * PI) * (s + (PI - angle) * c + translucency * (s - angle * c))
-}
 
 /// What [`Texel`] heights are counted in: the whole range.
 pub const HEIGHT_STEPS: f64 = 65535.0;
@@ -316,29 +304,6 @@ mod tests {
             let area = map.texel * map.texel * light.y;
             let kept = all / f64::from(DEPTH_STEPS) * area;
             assert!((kept - 40.0).abs() < 0.1, "{kept}");
-        }
-    }
-
-    #[test]
-    fn foliage_is_the_mean_over_leaves_that_face_all_ways() {
-        for degrees in [0.0f64, 30.0, 77.0, 90.0, 140.0, 180.0] {
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            let (eye, light) = (DVec3::Y, DVec3::new(sin, cos, 0.0));
-            let (mut sum, mut weight) = (0.0, 0.0);
-            // Normals on a spiral: as many everywhere.
-            let count = 20_000;
-            for k in 0..count {
-                let y = 1.0 - (f64::from(k) + 0.5) * 2.0 / f64::from(count);
-                let (sin, cos) = (f64::from(k) * 2.399_963_229_728_653).sin_cos();
-                let flat = (1.0 - y * y).sqrt();
-                let mut n = DVec3::new(flat * cos, y, flat * sin);
-                n *= if n.dot(eye) < 0.0 { -1.0 } else { 1.0 };
-                let cosine = n.dot(light);
-                sum += n.dot(eye) * (cosine.max(0.0) + 0.6 * (-cosine).max(0.0));
-                weight += n.dot(eye);
-            }
-            let mean = sum / weight;
-            assert!((foliage(cos, 0.6) - mean).abs() < 1e-4, "{degrees}: {mean}");
         }
     }
 

@@ -105,6 +105,15 @@ impl Camera {
         )
     }
 
+    /// The world position at picture coordinates (x, y) in this depth: the inverse of
+    /// [`Camera::project`].
+    pub fn unproject(&self, x: f64, y: f64, depth: f64) -> DVec3 {
+        let unit = 1.0 / self.pixels_per_unit(depth);
+        let right = (x - 0.5 * f64::from(self.width)) * unit;
+        let up = (0.5 * f64::from(self.height) - y) * unit;
+        self.eye + self.right * right + self.up * up + self.forward * depth
+    }
+
     /// How a box is seen: its longest side in pixels and the eye's elevation in degrees, both at the
     /// box's middle.
     pub fn sees(&self, [min, max]: [DVec3; 2]) -> (f64, f64) {
@@ -158,6 +167,7 @@ mod tests {
         assert!((c.pixels_per_unit(10.0) - 5.0).abs() < 1e-12);
         let (x, y, z) = c.project(DVec3::new(3.0, 2.0, 0.0));
         assert!((x - 115.0).abs() < 1e-9 && (y - 40.0).abs() < 1e-9 && (z - 10.0).abs() < 1e-12);
+        assert!(c.unproject(x, y, z).distance(DVec3::new(3.0, 2.0, 0.0)) < 1e-12);
     }
 
     #[test]

@@ -31,6 +31,8 @@ pub struct Material {
     pub double_sided: bool,
     /// The colour is emitted as it is, without lighting.
     pub unlit: bool,
+    /// A surface stands for many leaves that face all ways: it is lit by their mean, not by its normal.
+    pub scattered: bool,
 }
 
 impl Default for Material {
@@ -43,6 +45,7 @@ impl Default for Material {
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,
+            scattered: false,
         }
     }
 }

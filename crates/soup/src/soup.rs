@@ -20,6 +20,10 @@ pub struct TriangleSoup {
     pub uvs: Vec<Vec2>,
     /// Linear RGBA vertex colours, or empty.
     pub colors: Vec<[f32; 4]>,
+    /// Share of the sun that vertices get of what reaches them, `0..=1`, or empty: all of it.
+    pub sunlit: Vec<f32>,
+    /// Share of the sky that is seen from vertices, `0..=1`, or empty where nobody asked: all of it.
+    pub skylit: Vec<f32>,
     /// Vertex indices, three a triangle.
     pub triangles: Vec<[u32; 3]>,
     /// Material of each triangle; as long as `triangles`.
@@ -69,6 +73,8 @@ impl TriangleSoup {
             ("normals", self.normals.len()),
             ("uvs", self.uvs.len()),
             ("colors", self.colors.len()),
+            ("shares of the sun", self.sunlit.len()),
+            ("shares of the sky", self.skylit.len()),
         ] {
             if len != 0 && len != n {
                 return fail(format!("{len} {name} for {n} positions"));

@@ -132,6 +132,14 @@ fn light(normal: vec3f, sunlit: f32, skylit: f32) -> vec3f {
     return frame.sun * direct + frame.sky * skylit;
 }
 
+// forest_raster::scattered
+fn scattered(cosine: f32, translucency: f32) -> f32 {
+    let c = clamp(cosine, -1.0, 1.0);
+    let angle = acos(c);
+    let s = sqrt(1.0 - c * c);
+    return 2.0 / (3.0 * HALF_TURN) * (s + (HALF_TURN - angle) * c + translucency * (s - angle * c));
+}
+
 // The unit vector of two octahedral bytes: forest_points::record::decode_axis.
 fn decode_axis(code: vec2u) -> vec3f {
     let v = (vec2f(max(code, vec2u(1u))) - 128.0) / 127.0;

@@ -207,6 +207,7 @@ pub(crate) fn material(
         unlit: extensions.is_some_and(|e| {
             e.unlit.is_some() || e.others.get("KHR_materials_unlit").is_some_and(Value::is_object)
         }),
+        scattered: false,
     };
     Ok((material, base.texture.map(|t| t.look)))
 }

@@ -49,14 +49,6 @@ fn on_tile(v: ViewFrame, d: vec3f, half: f32, texels: f32) -> vec2f {
     return vec2f(dot(d, v.right.xyz), -dot(d, v.up.xyz)) * (0.5 * texels / half);
 }
 
-// forest_scene::foliage
-fn foliage(cosine: f32, translucency: f32) -> f32 {
-    let c = clamp(cosine, -1.0, 1.0);
-    let angle = acos(c);
-    let s = sqrt(1.0 - c * c);
-    return 2.0 / (3.0 * HALF_TURN) * (s + (HALF_TURN - angle) * c + translucency * (s - angle * c));
-}
-
 // Where a ray from the eye through `direction` meets a view's tile.
 fn tile_at(v: ViewFrame, center: vec3f, direction: vec3f, half: f32) -> vec2f {
     let toward = dot(direction, v.back.xyz);
@@ -140,7 +132,7 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) instance: 
     out.mask = t.mask;
     out.share = board.share;
     let left = exp(-s.clump);
-    out.sun = frame.sun * (foliage(dot(toward, frame.to_sun), frame.translucency) * left);
+    out.sun = frame.sun * (scattered(dot(toward, frame.to_sun), frame.translucency) * left);
     // The mean of normals turned to the eye, by their projected area, is two thirds long.
     out.sky = frame.sky * (skyward(toward * (2.0 / 3.0)) * left);
     return out;

@@ -1,0 +1,96 @@
+//! How bright leaves are: weights of sun and sky, fitted to rays with shadows.
+//!
+//! What lies on cards is lit as leaves that face all ways, where the shadow map says that the sun is seen,
+//! and by the share of the sky that the card sees ([`forest_raster::scattered`]). Leaves of one card do not
+//! shade each other, and those that are seen are not the mean of all: both are made good by one weight each,
+//! for which the mean light of a few pictures is that of the truth (docs/LIGHT.md).
+
+use forest_raster::{
+    Light, Picture, RayScene, Sampling, ShadowMap, Style, Sun, Surfaces, rasterize,
+    rasterize_shadowed,
+};
+use forest_soup::{Camera, TriangleSoup, luminance};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Suns, each with a view of its own.
+const SUNS: u32 = 6;
+
+/// Pixels of a picture's side, and samples along the side of a pixel.
+const SIDE: u32 = 96;
+const SAMPLES: u32 = 2;
+
+/// Weights beyond these are not believed.
+const WEIGHTS: std::ops::RangeInclusive<f64> = 0.25..=1.5;
+
+/// The truth: mean light of pictures under each sun, and under the sky.
+pub(crate) struct Brightness {
+    bounds: [DVec3; 2],
+    /// By sun: in sunlight, in skylight.
+    light: Vec<[f64; 2]>,
+}
+
+fn setting(i: u32, bounds: [DVec3; 2]) -> (DVec3, Camera) {
+    let pitch = if i.is_multiple_of(2) { 30.0f64 } else { 55.0 }.to_radians();
+    let yaw = (f64::from(i) * 360.0 / f64::from(SUNS)).to_radians();
+    let to_sun = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos());
+    // Around the tree at another pace than the sun: from before it, beside it and behind it.
+    (to_sun, Camera::around(bounds, [f64::from(i) * 107.0, 10.0], None, [SIDE; 2]))
+}
+
+fn styles(to_sun: DVec3) -> [Style; 2] {
+    [[1.0, 0.0], [0.0, 1.0]].map(|[sun, sky]| {
+        let (sun, sky) = ([sun; 3], [sky; 3]);
+        let light = Light::Sun(Sun { to_sun, sun, sky, translucency: 1.0, darkest: 1.0 });
+        Style { sampling: Sampling { side: SAMPLES, seed: 1 }, light }
+    })
+}
+
+fn mean(picture: &Picture) -> f64 {
+    picture.pixels.iter().map(|p| f64::from(luminance([p[0], p[1], p[2]]))).sum()
+}
+
+impl Brightness {
+    /// Of `soup`, whose materials `surfaces` holds.
+    pub(crate) fn of(soup: &TriangleSoup, surfaces: &Surfaces) -> Self {
+        let bounds = soup.bounds();
+        let bounds = [bounds.min, bounds.max].map(|p| soup.origin + p);
+        let rays = RayScene::new(soup, surfaces);
+        let light = (0..SUNS).map(|i| {
+            let (to_sun, camera) = setting(i, bounds);
+            styles(to_sun).map(|style| mean(&rays.picture(&camera, &style)))
+        });
+        Self { bounds, light: light.collect() }
+    }
+
+    /// Weights of sun and sky for the last of `level`'s materials, so that it is as bright in the mean.
+    pub(crate) fn weights(&self, level: &mut TriangleSoup, surfaces: &Surfaces) -> [f64; 2] {
+        let cards = |weight: f32, soup: &mut TriangleSoup| {
+            let dictionary = soup.materials.len() as u16 - 1;
+            let pairs = soup.triangles.iter().zip(&soup.triangle_materials);
+            for v in pairs.filter(|(_, m)| **m == dictionary).flat_map(|(t, _)| t) {
+                soup.sunlit[*v as usize] = weight;
+            }
+        };
+        let skylit = level.skylit.clone();
+        let (mut wood, mut all) = ([0.0; 2], [0.0; 2]);
+        for (weight, sums) in [(0.0, &mut wood), (1.0, &mut all)] {
+            cards(weight, level);
+            level.skylit = skylit.iter().zip(&level.sunlit).map(|(s, w)| s * w).collect();
+            for i in 0..SUNS {
+                let (to_sun, camera) = setting(i, self.bounds);
+                let map = Arc::new(ShadowMap::new(level, surfaces, self.bounds, to_sun));
+                let [sun, sky] = styles(to_sun);
+                let lit = rasterize_shadowed(level, surfaces, &camera, &sun, map);
+                sums[0] += mean(&lit);
+                sums[1] += mean(&rasterize(level, surfaces, &camera, &sky));
+            }
+        }
+        level.skylit = skylit;
+        [0, 1].map(|k| {
+            let truth: f64 = self.light.iter().map(|l| l[k]).sum();
+            let weight = (truth - wood[k]) / (all[k] - wood[k]);
+            if weight.is_finite() { weight.clamp(*WEIGHTS.start(), *WEIGHTS.end()) } else { 1.0 }
+        })
+    }
+}
