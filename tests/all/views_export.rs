@@ -293,3 +293,55 @@ fn the_program_exports_and_refuses() {
     let (code, _, err) = run(&["export", &points, "-o", &out, "--for", "three"]);
     assert!(code == 3 && err.contains("views.header"), "{code} {err}");
 }
+
+#[test]
+fn points_are_written_as_splats_that_cover_what_they_cover() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| arg(&dir.path().join(name));
+    let (pack, out) = (file("t.fpack"), file("out"));
+    succeed(&["points", &arg(&repo("sample-data/shrub.obj")), "-o", &pack]);
+    let rows = |more: &[&str]| -> Vec<[f32; 17]> {
+        succeed(&[&["export", &pack, "--format", "ply", "-o", &out, "--force"][..], more].concat());
+        let bytes = std::fs::read(dir.path().join("out/t.ply")).unwrap();
+        let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+        let header = std::str::from_utf8(&bytes[..end]).unwrap();
+        assert!(header.starts_with("ply\nformat binary_little_endian 1.0\nelement vertex "));
+        assert_eq!(header.matches("property float").count(), 17);
+        let floats: Vec<f32> =
+            bytes[end..].as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        let rows = floats.as_chunks::<17>().0.to_vec();
+        assert!(header.contains(&format!("element vertex {}\n", rows.len())));
+        rows
+    };
+    let opacity = |r: &[f32; 17]| 1.0 / (1.0 + f64::from(-r[9]).exp());
+    // Face-on: 2πσ² at full opacity.
+    let area = |rows: &[[f32; 17]]| -> f64 {
+        let of = |r: &[f32; 17]| std::f64::consts::TAU * f64::from(2.0 * r[10]).exp() * opacity(r);
+        rows.iter().map(of).sum()
+    };
+    let (all, few) = (rows(&[]), rows(&["--points", "500"]));
+    assert!(all.len() > 5000 && (250..=500).contains(&few.len()), "{} {}", all.len(), few.len());
+    // Triangles of the source: 1516 halves of leaf cards, of which textures cover a quarter, and twigs.
+    let soup = forest_import::Block::parse(&[arg(&repo("sample-data/shrub.obj"))]).unwrap();
+    let soup =
+        soup.load(&forest_import::Limits::default()).unwrap().model.flatten(1 << 20).unwrap();
+    let surface: f64 = (0..soup.triangles.len())
+        .map(|i| {
+            let [a, b, c] = soup.corners(i).map(|p| p.as_dvec3());
+            let leaf = soup.materials[soup.triangle_materials[i] as usize].name == "leaves";
+            0.5 * (b - a).cross(c - a).length() * if leaf { 0.26 } else { 1.0 }
+        })
+        .sum();
+    let ratio = area(&all) / surface;
+    assert!((0.8..1.2).contains(&ratio), "{ratio}");
+    let bounds = soup.bounds();
+    for r in &all {
+        let p = DVec3::new(r[0].into(), r[1].into(), r[2].into());
+        assert!(p.cmpge(bounds.min - 0.01).all() && p.cmple(bounds.max + 0.01).all(), "{p}");
+        let turn = glam::Quat::from_xyzw(r[14], r[15], r[16], r[13]);
+        assert!((turn * Vec3::Z).distance(Vec3::new(r[3], r[4], r[5])) < 1e-3, "{r:?}");
+        assert!(r.iter().all(|v| v.is_finite()));
+    }
+    let (code, _, err) = run(&["export", &pack, "--format", "png", "-o", &out, "--force"]);
+    assert!(code != 0 && err.contains("views.header"), "{err}");
+}

@@ -3,14 +3,15 @@
 use crate::failure::Usage;
 use crate::output;
 use anyhow::{Context, Result};
-use forest_export::{Engine, PlainFormat, for_engine, plain};
+use forest_export::{Engine, PlainFormat, for_engine, plain, splats};
 use forest_pack::Pack;
+use forest_points::PointsBlock;
 use forest_views::ViewsBlock;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Pack whose views are exported.
+    /// Pack whose views, or points, are exported.
     #[arg(value_name = "PACK")]
     pack: PathBuf,
     /// Folder to write to; it is made if it is missing.
@@ -22,6 +23,10 @@ pub(crate) struct Args {
     /// Plain files for any reader.
     #[arg(long, value_enum, value_delimiter = ',')]
     format: Vec<FormatArg>,
+    /// Most points of a PLY file: it holds the finest cut of so many.
+    #[arg(long, default_value_t = u64::MAX, hide_default_value = true, value_name = "N")]
+    #[arg(value_parser = clap::value_parser!(u64).range(1..))]
+    points: u64,
     /// Name of the tree in file names; default: the pack's.
     #[arg(long)]
     name: Option<String>,
@@ -48,21 +53,24 @@ enum FormatArg {
     Exr,
     /// Texture arrays with mips that keep coverage, block-compressed.
     Ktx2,
+    /// Points, as Gaussian splats.
+    Ply,
 }
 
-impl From<FormatArg> for PlainFormat {
-    fn from(f: FormatArg) -> Self {
-        match f {
-            FormatArg::Png => Self::Png,
-            FormatArg::Exr => Self::Exr,
-            FormatArg::Ktx2 => Self::Ktx2,
+impl FormatArg {
+    /// What views are written as; `None` for points.
+    fn of_views(self) -> Option<PlainFormat> {
+        match self {
+            Self::Png => Some(PlainFormat::Png),
+            Self::Exr => Some(PlainFormat::Exr),
+            Self::Ktx2 => Some(PlainFormat::Ktx2),
+            Self::Ply => None,
         }
     }
 }
 
 pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let pack = Pack::open(&args.pack)?;
-    let block = ViewsBlock::open(&pack)?;
     let stem = args.pack.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = args.name.clone().unwrap_or(stem);
     if name.is_empty() || name.contains(['/', '\\']) {
@@ -75,11 +83,16 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
             EngineArg::Godot => Engine::Godot,
             EngineArg::Three => Engine::Three,
         };
-        files.extend(for_engine(&block, engine, &name)?);
+        files.extend(for_engine(&ViewsBlock::open(&pack)?, engine, &name)?);
     }
-    let formats: Vec<PlainFormat> = args.format.iter().map(|&f| f.into()).collect();
+    let formats: Vec<PlainFormat> = args.format.iter().filter_map(|f| f.of_views()).collect();
     if !formats.is_empty() {
-        files.extend(plain(&block, &formats, &name)?);
+        files.extend(plain(&ViewsBlock::open(&pack)?, &formats, &name)?);
+    }
+    if args.format.iter().any(|f| f.of_views().is_none()) {
+        let block = PointsBlock::open(&pack)?;
+        let few = || Usage(format!("--points {}: the pack has no cut of so few", args.points));
+        files.push(splats(&block, &name, args.points).ok_or_else(few)?);
     }
     std::fs::create_dir_all(&args.output).with_context(|| args.output.display().to_string())?;
     for file in &files {

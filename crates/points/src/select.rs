@@ -198,9 +198,8 @@ pub fn select_into(block: &PointsBlock, camera: &Camera, t: &Thresholds, cut: &m
     }
 }
 
-/// The finest cut of at most `most` points and triangles: all triangles if they are so few, else
-/// thresholds s_m, s_M = `ratio`·s_m without
-/// depth bias, and what they draw. Counts are exact for this camera. `None` if even one point is too
+/// The finest cut of at most `most` points and triangles: all triangles if they are so few and `ratio` is
+/// finite, else thresholds s_m, s_M = `ratio`·s_m without depth bias, and what they draw. Counts are exact for this camera. `None` if even one point is too
 /// many.
 pub fn within_budget(
     block: &PointsBlock,
@@ -209,7 +208,7 @@ pub fn within_budget(
     most: u64,
 ) -> Option<(Thresholds, u64)> {
     let triangles = block.triangles.len() as u64;
-    if (1..=most).contains(&triangles) {
+    if ratio.is_finite() && (1..=most).contains(&triangles) {
         // The source itself: nothing is better.
         return Some((Thresholds::TRIANGLES, triangles));
     }

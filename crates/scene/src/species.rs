@@ -129,11 +129,8 @@ fn cut(block: &PointsBlock, most: u64) -> (Camera, Thresholds) {
         largest: PixelArea(f64::INFINITY),
         depth_bias: PixelArea(0.0),
     };
-    let thresholds = match within_budget(block, &camera, f64::INFINITY, most) {
-        Some((t, _)) if t != Thresholds::TRIANGLES => t,
-        Some(_) => Thresholds { finest: PixelArea(0.0), ..coarsest },
-        None => coarsest,
-    };
+    let found = within_budget(block, &camera, f64::INFINITY, most);
+    let thresholds = found.map_or(coarsest, |(thresholds, _)| thresholds);
     (camera, thresholds)
 }
 

@@ -2,7 +2,7 @@
 //!
 //! [`for_engine`] writes the textures and the side file that the impostor shaders of Unreal, Godot
 //! and three.js read; [`plain()`] writes PNG, EXR or KTX2 for any reader; [`contact_sheet`] a sheet for
-//! people; [`photographs()`] a capture for NeRF tools. Nothing touches the disk: an export is a list of [`ExportFile`]s.
+//! people; [`photographs()`] a capture for NeRF tools; [`splats`] points as Gaussian splats. Nothing touches the disk: an export is a list of [`ExportFile`]s.
 //!
 //! ```
 //! use forest_export::{Engine, for_engine, tiles};
@@ -47,6 +47,7 @@ mod ktx2;
 mod photographs;
 mod picture;
 mod plain;
+mod ply;
 mod sheet;
 
 pub use engine::{Engine, TileFrame, for_engine, tiles};
@@ -54,4 +55,5 @@ pub use error::ExportError;
 pub use photographs::photographs;
 pub use picture::ExportFile;
 pub use plain::{PlainFormat, plain};
+pub use ply::splats;
 pub use sheet::contact_sheet;
