@@ -12,7 +12,8 @@
 #   make landscape  measure landscapes beside full meshes, LOD meshes and billboards; writes docs/LANDSCAPE.md
 #                 and the README's table (needs 6 GiB)
 #   make codebooks  codebook training beside faiss and scikit-learn, if $PYTHON has them; writes docs/CODEBOOKS.md
-#   make three    draw exported views in three.js, in a headless browser; writes docs/three.png
+#   make three    draw exported views and foliage in three.js, in a headless browser, after the Khronos
+#                 validator has passed the glb; writes docs/three.png, docs/levels.png
 #   make picture  draw the README's picture anew
 #   make golden   write the golden packs anew, after a meant change of the format
 #   make samples  grow sample-data anew
@@ -170,6 +171,9 @@ three: setup
 	target/release/forest-bake export $(OUT)/three.fpack -o $(OUT)/three --for three --name tree --force
 	cd tests/three && node shot.mjs ../../$(OUT)/three ../../docs/three.png --size 240 --show lit \
 	  --from '0,0,1;1,0.1,0.4;1,0.5,-0.6;-0.3,0.2,-1;-1,0.3,0.2;0.2,1,0.3;0,1,0;0.6,0.3,0.9'
+	target/release/forest-bake foliage sample-data/broadleaf_young.gltf -o $(OUT)/three.fpack
+	target/release/forest-bake export $(OUT)/three.fpack -o $(OUT)/three --format glb --name tree --force
+	cd tests/three && node levels.mjs ../../$(OUT)/three/tree.glb ../../docs/levels.png --size 240
 
 picture: setup
 	$(CARGO) build --release --workspace --bins

@@ -24,7 +24,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-raster", &["forest-soup"]),
     ("forest-vq", &[]),
     ("forest-views", &["forest-soup", "forest-raster", "forest-pack"]),
-    ("forest-export", &["forest-soup", "forest-pack", "forest-points", "forest-views"]),
+    (
+        "forest-export",
+        &["forest-soup", "forest-pack", "forest-points", "forest-views", "forest-foliage"],
+    ),
     ("forest-volume", &["forest-soup", "forest-raster", "forest-pack", "forest-vq"]),
     ("forest-foliage", &["forest-soup", "forest-raster", "forest-pack", "forest-points"]),
     (

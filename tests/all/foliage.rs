@@ -46,6 +46,22 @@ fn the_program_bakes_draws_and_keeps_what_is_there() {
     // And the other way round.
     succeed(&["points", &tree, "-o", &pack, "--surfel-size", "triangle"]);
     assert!(inspect(Path::new(&pack))["foliage"].is_object(), "foliage is kept");
+    // Points hang on its branches, whichever came first.
+    succeed(&["verify", &pack]);
+    let points = ["draw", &pack, "-o", &png, "--as", "points", "--size", "64", "--samples", "2"];
+    let picture = |more: &[&str]| {
+        succeed(&[&points[..], more].concat());
+        std::fs::read(&png).unwrap()
+    };
+    assert_ne!(picture(&[]), picture(&["--wind", "1,2.2"]), "points bend");
+    succeed(&["views", &tree, "-o", &pack, "--views", "9", "--texels", "16", "-q"]);
+    assert_ne!(picture(&[]), picture(&["--wind", "1,2.2"]), "they still hang there");
+    let (code, _, err) = run(&["draw", &pack, "-o", &png, "--as", "views", "--wind", "1"]);
+    assert!(code == 1 && err.contains("views and volumes lean as a whole"), "{code} {err}");
+    // From afar no triangle of the points is left; foliage keeps its materials.
+    let lean = file("lean");
+    succeed(&["needs", &pack, "-o", &lean, "--nearest", "200m", "-q"]);
+    succeed(&["verify", &arg(&dir.path().join("lean/t.fpack"))]);
     for (wrong, code, says) in [
         (&["--level", "3"][..], 1, "--level 3: the coarsest level of the pack is 2"),
         (&["--wind", "3"], 1, "a strength from 0 to 2"),

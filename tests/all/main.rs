@@ -5,6 +5,7 @@ mod blocks; // several trees baked together
 mod cli; // the program: usage, exit codes, what it prints, what it leaves behind
 mod eval; // packs against their sources: reports, calibration, chosen levels
 mod foliage; // foliage: wood and leaves, levels, wind
+mod foliage_export; // foliage as glb, branches as textures
 mod fuzz_corpus; // inputs that fuzzing found or started from
 mod goldens; // committed packs: read, damaged, baked again
 mod gpu; // the graphics device against the CPU renderer, sample by sample

@@ -8,8 +8,12 @@ pub mod reports;
 pub mod screen;
 pub mod soups;
 
-use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, draw_points, read_surfaces};
-use forest_foliage::{FoliageBlock, FoliageError, FoliageOptions, Wind};
+use forest_draw::{
+    FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
+};
+use forest_foliage::{
+    BentPoints, FoliageBlock, FoliageError, FoliageOptions, PointsWind, Pose, Wind,
+};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{ErrorKind, Light, Measures, Need};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
@@ -23,6 +27,7 @@ use forest_volume::{
     Blending, CodebookOptions, Detail, Stand, Volume, VolumeBlock, VolumeError, VolumeOptions,
 };
 use glam::DVec3;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A fixed `meta` section.
@@ -117,6 +122,38 @@ pub fn bake_foliage(
     Ok((std::fs::read(&path).expect("the pack that was just written"), report))
 }
 
+/// One pack of the sections of several; of two alike the first's. Points hang on foliage, if both are there.
+///
+/// # Panics
+/// If a pack is damaged.
+pub fn merged(packs: &[Vec<u8>]) -> Vec<u8> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path).expect("a pack");
+    let mut there = BTreeSet::new();
+    for pack in packs.iter().map(|bytes| open(bytes).expect("a pack")) {
+        for (id, _) in pack.sections().filter(|(id, _)| there.insert(*id)) {
+            writer.copy(&pack, id).expect("a section");
+        }
+    }
+    writer.finish().expect("a pack");
+    let bytes = std::fs::read(&path).expect("the pack");
+    let pack = open(&bytes).expect("a pack");
+    if !FoliageBlock::is_in(&pack) || !PointsBlock::is_in(&pack) || there.contains(&TIED) {
+        return bytes;
+    }
+    let (foliage, points) = (FoliageBlock::open(&pack), PointsBlock::open(&pack));
+    let wind = PointsWind::new(&foliage.expect("foliage"), &points.expect("points"));
+    let mut writer = PackWriter::create(&path).expect("a pack");
+    pack.sections().for_each(|(id, _)| writer.copy(&pack, id).expect("a section"));
+    wind.write(&mut writer).expect("the wind");
+    writer.finish().expect("a pack");
+    std::fs::read(&path).expect("the pack")
+}
+
+/// Says that points hang on foliage.
+const TIED: SectionId = SectionId::new(kind::WIND_POINTS, 0);
+
 /// The trees that a report is about: these of sample-data, and these of ../shared/trees where they
 /// are; the others are named on stderr.
 pub fn report_trees(samples: &[&str], shared: &[&str]) -> Vec<PathBuf> {
@@ -169,6 +206,14 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
     }
     let block = PointsBlock::open(&pack)?;
     let surfaces = read_surfaces(&pack, &block)?;
+    let foliage = FoliageBlock::is_in(&pack).then(|| FoliageBlock::open(&pack)).transpose()?;
+    let gale = Wind { strength: 1.0, time: 2.0, ..Wind::default() };
+    let pose = foliage.as_ref().map_or_else(Pose::default, |f| Pose::new(f.branches, &gale, 0.0));
+    let wind = match &foliage {
+        Some(foliage) => PointsWind::read(&pack, &block, foliage.branches.len())?,
+        None => None,
+    };
+    let bent = foliage.as_ref().zip(wind.as_ref()).map(|(f, w)| BentPoints::new(f, w, &pose));
     let projection = Projection::Perspective { fov_y: 1.0 };
     for distance in [0.0, 1.0, 1e4] {
         let eye = block.origin() + DVec3::Z * (distance * block.scale());
@@ -179,6 +224,9 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         let small = Camera { width: 16, height: 16, ..camera };
         let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
         draw_points(&block, surfaces.as_ref(), &small, &thresholds, &style);
+        if let Some(bent) = &bent {
+            draw_bent_points(&block, surfaces.as_ref(), &small, &thresholds, &style, bent);
+        }
     }
     Ok(drawn)
 }

@@ -4,8 +4,10 @@ use crate::failure::Usage;
 use crate::light::LightArg;
 use crate::output;
 use anyhow::{Context, Result, bail};
-use forest_draw::{FoliageScene, ViewsLevel, VolumeScene, draw_points, read_surfaces};
-use forest_foliage::{FoliageBlock, Wind};
+use forest_draw::{
+    FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
+};
+use forest_foliage::{BentPoints, FoliageBlock, PointsWind, Pose, Wind};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
@@ -71,7 +73,7 @@ pub(crate) struct Args {
     /// volume.
     #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive_wide)]
     texel: f64,
-    /// Wind that foliage stands in: its strength (0 calm, 1 a gale), or STRENGTH,SECONDS at a moment.
+    /// Wind that foliage, and points in a pack with foliage, stand in: its strength (0 calm, 1 a gale), or STRENGTH,SECONDS at a moment.
     #[arg(long, default_value = "0", value_name = "WIND")]
     wind: Wind,
     /// Light, without shadows.
@@ -93,7 +95,7 @@ enum Representation {
     Views,
     /// Billboards of an octree, in the light of their photographs.
     Volume,
-    /// Cards of leaves, sheets of twigs, tubes of branches; bent by --wind.
+    /// Cards of leaves, sheets of twigs, tubes of branches.
     Foliage,
 }
 
@@ -154,6 +156,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     // Without any, opening points says what is missing.
     let found = found.into_iter().find(|f| f.0).map_or(Representation::Points, |f| f.1);
     let what = args.what.unwrap_or(found);
+    if args.wind.strength > 0.0 && matches!(what, Representation::Views | Representation::Volume) {
+        let problem = "--wind: views and volumes lean as a whole, in forest-view alone";
+        return Err(Usage(problem.into()).into());
+    }
     let pictures = match what {
         Representation::Points => draw_all_points(args, &pack, &style, quiet)?,
         Representation::Views => draw_all_views(args, &pack, &style, quiet)?,
@@ -163,14 +169,41 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     write(args, &pictures)
 }
 
+impl Args {
+    /// The foliage of a pack that its points bend with; `None` in a calm.
+    fn points_in_wind<'p>(
+        &self,
+        pack: &'p Pack,
+        block: &PointsBlock,
+    ) -> Result<Option<(FoliageBlock<'p>, PointsWind<'p>)>> {
+        if self.wind.strength <= 0.0 {
+            return Ok(None);
+        }
+        let foliage = FoliageBlock::is_in(pack).then(|| FoliageBlock::open(pack)).transpose()?;
+        let wind = match &foliage {
+            Some(foliage) => PointsWind::read(pack, block, foliage.branches.len())?,
+            None => None,
+        };
+        let untied = "--wind: the points do not know of branches; add foliage to their pack";
+        Ok(Some(foliage.zip(wind).ok_or_else(|| Usage(untied.into()))?))
+    }
+}
+
 fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
     let block = PointsBlock::open(pack)?;
     let surfaces = read_surfaces(pack, &block)?;
     let [min, max] = [block.header.min, block.header.max].map(|v| block.to_world(v.into()));
     let camera = args.camera([min, max])?;
+    let tied = args.points_in_wind(pack, &block)?;
+    let pose = tied.as_ref().map(|(f, _)| Pose::new(f.branches, &args.wind, 0.0));
+    let bent = tied.as_ref().zip(pose.as_ref()).map(|((f, w), pose)| BentPoints::new(f, w, pose));
     let mut pictures = Vec::new();
     for thresholds in args.levels(pack, &block, &camera, quiet)? {
-        let (picture, drawn) = draw_points(&block, surfaces.as_ref(), &camera, &thresholds, style);
+        let (surfaces, cut) = (surfaces.as_ref(), &thresholds);
+        let (picture, drawn) = match &bent {
+            Some(bent) => draw_bent_points(&block, surfaces, &camera, cut, style, bent),
+            None => draw_points(&block, surfaces, &camera, cut, style),
+        };
         if !quiet && block.is_beyond(&camera, &thresholds) {
             let (name, finest) = (pack.path().display(), thresholds.finest.0);
             eprintln!(

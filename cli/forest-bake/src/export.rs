@@ -3,7 +3,8 @@
 use crate::failure::Usage;
 use crate::output;
 use anyhow::{Context, Result};
-use forest_export::{Engine, PlainFormat, for_engine, plain, splats};
+use forest_export::{Engine, PlainFormat, for_engine, levels, pivots, plain, splats};
+use forest_foliage::FoliageBlock;
 use forest_pack::Pack;
 use forest_points::PointsBlock;
 use forest_views::ViewsBlock;
@@ -11,7 +12,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Pack whose views, or points, are exported.
+    /// Pack whose views, points or foliage are exported.
     #[arg(value_name = "PACK")]
     pack: PathBuf,
     /// Folder to write to; it is made if it is missing.
@@ -45,7 +46,7 @@ enum EngineArg {
     Three,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum FormatArg {
     /// Sheets of all tiles: colour, normals, 16-bit depth, occlusion.
     Png,
@@ -55,16 +56,20 @@ enum FormatArg {
     Ktx2,
     /// Points, as Gaussian splats.
     Ply,
+    /// Foliage: all levels, wind as vertex attributes; the views, if there are any, as the last level.
+    Glb,
+    /// Branches of foliage as textures: pivots and parents for Pivot Painter 2 materials.
+    Pivots,
 }
 
 impl FormatArg {
-    /// What views are written as; `None` for points.
+    /// What views are written as; `None` for what is not made of views.
     fn of_views(self) -> Option<PlainFormat> {
         match self {
             Self::Png => Some(PlainFormat::Png),
             Self::Exr => Some(PlainFormat::Exr),
             Self::Ktx2 => Some(PlainFormat::Ktx2),
-            Self::Ply => None,
+            Self::Ply | Self::Glb | Self::Pivots => None,
         }
     }
 }
@@ -89,7 +94,14 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     if !formats.is_empty() {
         files.extend(plain(&ViewsBlock::open(&pack)?, &formats, &name)?);
     }
-    if args.format.iter().any(|f| f.of_views().is_none()) {
+    if args.format.contains(&FormatArg::Glb) {
+        let views = ViewsBlock::is_in(&pack).then(|| ViewsBlock::open(&pack)).transpose()?;
+        files.push(levels(&FoliageBlock::open(&pack)?, views.as_ref(), &name)?);
+    }
+    if args.format.contains(&FormatArg::Pivots) {
+        files.extend(pivots(&FoliageBlock::open(&pack)?, &name)?);
+    }
+    if args.format.contains(&FormatArg::Ply) {
         let block = PointsBlock::open(&pack)?;
         let few = || Usage(format!("--points {}: the pack has no cut of so few", args.points));
         files.push(splats(&block, &name, args.points).ok_or_else(few)?);

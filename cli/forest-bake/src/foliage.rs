@@ -61,6 +61,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         target::keep_others(&mut writer, pack, kind::FOLIAGE_HEADER, own)?;
     }
     writer.finish()?;
+    target::tie(&args.output)?;
     let seconds = [source.seconds, start.elapsed().as_secs_f64()];
     let summary = Summary::new(args, &report, seconds)?;
     if !quiet {

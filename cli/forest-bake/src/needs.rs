@@ -244,7 +244,11 @@ fn write(
     }
     let of_scene = args.nearest.is_none();
     let rest = |kind: u16| match kind {
-        kind::POINTS_HEADER..kind::VOLUME_HEADER => false,
+        // Foliage is drawn with them, even where no triangle is left.
+        kind::MATERIALS | kind::TEXTURE => !of_scene && kept.triangles[1] == 0,
+        kind::POINTS_HEADER..kind::VOLUME_HEADER | kind::WIND_POINTS | kind::WIND_TRIANGLES => {
+            false
+        }
         kind::VOLUME_HEADER.. => !of_scene,
         _ => true,
     };
@@ -252,6 +256,7 @@ fn write(
         writer.copy(pack, id)?;
     }
     writer.finish()?;
+    crate::target::tie(&target)?;
     let bytes = [pack.file_length(), std::fs::metadata(&target)?.len()];
     Ok(Row { pack: target.display().to_string(), bytes, kept, view_levels })
 }

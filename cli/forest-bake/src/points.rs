@@ -84,6 +84,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         target::keep_others(&mut writer, pack, kind::POINTS_HEADER, |k| is_own(k, &options))?;
     }
     writer.finish()?;
+    target::tie(&baked)?;
     if args.measure {
         crate::eval::measure(&baked, &args.output, &source.soup, quiet)?;
     }

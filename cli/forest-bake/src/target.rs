@@ -2,9 +2,11 @@
 
 use crate::failure::Usage;
 use anyhow::Result;
+use forest_foliage::{FoliageBlock, PointsWind};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackWriter, SectionId, kind};
+use forest_points::PointsBlock;
 use std::path::Path;
 
 /// The pack that is there already, if its other representations may be kept.
@@ -29,6 +31,25 @@ pub(crate) fn existing(path: &Path, meta: &Meta, force: bool) -> Result<Option<P
     }
 }
 
+/// What of a pack follows from its points and its foliage together.
+const TIED: [u16; 2] = [kind::WIND_POINTS, kind::WIND_TRIANGLES];
+
+/// Hangs the points of a finished pack on its foliage, if it has both: they bend alike in the wind.
+pub(crate) fn tie(path: &Path) -> Result<()> {
+    let pack = Pack::open(path)?;
+    if !PointsBlock::is_in(&pack) || !FoliageBlock::is_in(&pack) {
+        return Ok(());
+    }
+    let wind = PointsWind::new(&FoliageBlock::open(&pack)?, &PointsBlock::open(&pack)?);
+    let mut writer = PackWriter::create(path)?;
+    for (id, _) in pack.sections().filter(|(id, _)| !TIED.contains(&id.kind)) {
+        writer.copy(&pack, id)?;
+    }
+    wind.write(&mut writer)?;
+    writer.finish()?;
+    Ok(())
+}
+
 /// Copies what `pack` holds of other representations than the one that is baked anew: sections
 /// that are not `own`, and measured rows that are not of `representation`.
 pub(crate) fn keep_others(
@@ -37,7 +58,11 @@ pub(crate) fn keep_others(
     representation: u16,
     own: impl Fn(u16) -> bool,
 ) -> Result<()> {
-    let foreign = |kind: u16| kind != kind::META && kind != kind::MEASURES && !own(kind);
+    let unties = [kind::POINTS_HEADER, kind::FOLIAGE_HEADER].contains(&representation);
+    let anew = |kind: u16| {
+        [kind::META, kind::MEASURES].contains(&kind) || (unties && TIED.contains(&kind))
+    };
+    let foreign = |kind: u16| !anew(kind) && !own(kind);
     for (id, _) in pack.sections().filter(|(id, _)| foreign(id.kind)) {
         writer.copy(pack, id)?;
     }

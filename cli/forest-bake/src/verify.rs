@@ -2,7 +2,7 @@
 
 use crate::output;
 use anyhow::Result;
-use forest_foliage::FoliageBlock;
+use forest_foliage::{FoliageBlock, PointsWind};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, SectionId, kind};
@@ -44,8 +44,8 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
     if VolumeBlock::is_in(&pack) {
         VolumeBlock::open(&pack)?.texels()?;
     }
-    if FoliageBlock::is_in(&pack) {
-        let block = FoliageBlock::open(&pack)?;
+    let foliage = FoliageBlock::is_in(&pack).then(|| FoliageBlock::open(&pack)).transpose()?;
+    if let Some(block) = &foliage {
         block.stored()?;
         block.materials()?;
     }
@@ -53,6 +53,9 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
         return Ok(());
     }
     let block = PointsBlock::open(&pack)?;
+    if let Some(foliage) = foliage {
+        PointsWind::read(&pack, &block, foliage.branches.len())?;
+    }
     if !block.triangles.is_empty() {
         let (materials, _) = read_materials(&pack)?;
         let (have, want) = (materials.len(), block.header.uv_ranges.len());

@@ -42,7 +42,9 @@ mod views;
 mod volume;
 
 pub use foliage::FoliageScene;
-pub use points::{Drawn, PointsFrame, draw_points, point_ellipses, read_surfaces};
+pub use points::{
+    Drawn, PointsFrame, draw_bent_points, draw_points, point_ellipses, read_surfaces,
+};
 pub use subject::PointsSubject;
 pub use views::{ViewsDrawn, ViewsLevel};
 pub use volume::{VolumeDrawn, VolumeScene};

@@ -1,5 +1,6 @@
 //! The points representation: select, project, draw.
 
+use forest_foliage::BentPoints;
 use forest_pack::{Pack, PackError};
 use forest_points::record::decode_axis;
 use forest_points::spheroid::Footprint;
@@ -9,7 +10,7 @@ use forest_points::{
 };
 use forest_raster::{Corner, DisplayList, Ellipse, Picture, Projector, Style, Surfaces, draw};
 use forest_soup::{Camera, srgb8_to_linear};
-use glam::{DVec2, Vec2};
+use glam::{DVec2, DVec3, Vec2};
 use rayon::prelude::*;
 
 /// The surfaces of a pack, `None` if its block has no triangles to draw them on.
@@ -49,7 +50,20 @@ pub fn draw_points(
     thresholds: &Thresholds,
     style: &Style,
 ) -> (Picture, Drawn) {
-    let frame = PointsFrame::new(block, surfaces, camera, thresholds, style);
+    let frame = PointsFrame::new(block, surfaces, camera, thresholds, style, None);
+    (frame.draw(), frame.drawn)
+}
+
+/// [`draw_points`], as the wind bends them.
+pub fn draw_bent_points(
+    block: &PointsBlock,
+    surfaces: Option<&Surfaces>,
+    camera: &Camera,
+    thresholds: &Thresholds,
+    style: &Style,
+    bent: &BentPoints,
+) -> (Picture, Drawn) {
+    let frame = PointsFrame::new(block, surfaces, camera, thresholds, style, Some(bent));
     (frame.draw(), frame.drawn)
 }
 
@@ -63,23 +77,24 @@ pub struct PointsFrame<'a> {
 }
 
 impl<'a> PointsFrame<'a> {
-    /// Selects and projects; the arguments are those of [`draw_points`].
+    /// Selects and projects; the arguments are those of [`draw_points`] and [`draw_bent_points`].
     pub fn new(
         block: &PointsBlock,
         surfaces: Option<&'a Surfaces>,
         camera: &'a Camera,
         thresholds: &Thresholds,
         style: &'a Style,
+        bent: Option<&BentPoints>,
     ) -> Self {
         let mut thresholds = *thresholds;
         if surfaces.is_none() {
             thresholds.largest.0 = f64::INFINITY;
         }
         let cut = select(block, camera, &thresholds);
-        let all = &|_| true;
-        let mut list = DisplayList::of_ellipses(point_ellipses(block, &cut, camera, style, all));
+        let ellipses = point_ellipses(block, &cut, camera, style, bent, &|_| true);
+        let mut list = DisplayList::of_ellipses(ellipses);
         if let Some(surfaces) = surfaces {
-            triangles(block, &cut, camera, surfaces, style, &mut list);
+            triangles(block, &cut, camera, surfaces, style, bent, &mut list);
         }
         let points = cut.points(block).count() as u64;
         let drawn = Drawn { points, triangles: cut.triangle_count() };
@@ -117,6 +132,7 @@ pub fn point_ellipses(
     cut: &Cut,
     camera: &Camera,
     style: &Style,
+    bent: Option<&BentPoints>,
     keep: &(dyn Fn(u32) -> bool + Sync),
 ) -> Vec<Ellipse> {
     let projector = Projector::new(camera, near(block));
@@ -125,7 +141,13 @@ pub fn point_ellipses(
             .filter(|(id, _, _)| keep(*id))
             .filter_map(|(id, cell, p)| {
                 let number = id.wrapping_add(block.point_offset(c.cell));
-                ellipse(block, &projector, camera, style, number, cell, p)
+                let mut world = block.to_world(block.position(cell, p.position));
+                let mut axis = p.axis();
+                if let Some(bent) = bent {
+                    let hung = bent.point(id);
+                    (world, axis) = (bent.place(hung, world), bent.direction(hung, axis));
+                }
+                ellipse(block, &projector, camera, style, number, p, [world, axis])
             })
             .collect()
     };
@@ -143,15 +165,14 @@ fn ellipse(
     camera: &Camera,
     style: &Style,
     id: u32,
-    cell: &CellRecord,
     p: &PointRecord,
+    [world, axis]: [DVec3; 2],
 ) -> Option<Ellipse> {
-    let world = block.to_world(block.position(cell, p.position));
     let (x, y, depth) = camera.project(world);
     if projector.is_behind(depth) {
         return None;
     }
-    let (axis, to_eye) = (p.axis(), camera.to_eye(world));
+    let to_eye = camera.to_eye(world);
     let center = DVec2::new(x, y);
     let radius = block.radius(p) * block.scale() * camera.pixels_per_unit(depth);
     // y points down in a picture.
@@ -181,6 +202,7 @@ fn triangles<'s>(
     camera: &Camera,
     surfaces: &'s Surfaces,
     style: &Style,
+    bent: Option<&BentPoints>,
     list: &mut DisplayList<'s>,
 ) {
     let projector = Projector::new(camera, near(block));
@@ -190,7 +212,7 @@ fn triangles<'s>(
         let first_id = block.triangle_offset(c.cell);
         for i in c.triangles.clone() {
             let t = &block.triangles[i as usize];
-            let corners = corners(block, cell, i as usize, t, style);
+            let corners = corners(block, cell, i, t, style, bent);
             list.triangle(&projector, surfaces, t.material, first_id.wrapping_add(i), corners);
         }
     }
@@ -200,12 +222,13 @@ fn triangles<'s>(
 fn corners(
     block: &PointsBlock,
     cell: &CellRecord,
-    index: usize,
+    index: u32,
     t: &TriangleRecord,
     style: &Style,
+    bent: Option<&BentPoints>,
 ) -> [Corner; 3] {
     let range = block.header.uv_ranges[t.material as usize];
-    let colors = block.triangle_colors.get(index);
+    let colors = block.triangle_colors.get(index as usize);
     std::array::from_fn(|k| {
         let v = t.corners[k];
         let color = colors.map_or([1.0; 4], |c| {
@@ -213,12 +236,17 @@ fn corners(
             let [r, g, b] = [r, g, b].map(srgb8_to_linear);
             [r, g, b, f32::from(a) / 255.0]
         });
-        let position = block.to_world(block.position(cell, v.position));
+        let mut position = block.to_world(block.position(cell, v.position));
+        let mut normal = decode_axis(v.normal);
+        if let Some(bent) = bent {
+            let hung = bent.corners(index)[k];
+            (position, normal) = (bent.place(hung, position), bent.direction(hung, normal));
+        }
         Corner {
             position,
             sunlit: style.light.seen(position - block.middle(), block.half_diagonal()),
             skylit: 1.0,
-            normal: decode_axis(v.normal).as_vec3(),
+            normal: normal.as_vec3(),
             uv: Vec2::from_array(range.decode(v.uv)),
             color,
         }

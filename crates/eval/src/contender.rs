@@ -264,7 +264,8 @@ fn draw_points(
     look: Look,
     style: &Style,
 ) -> (Picture, Cost) {
-    let mut frame = forest_draw::PointsFrame::new(block, surfaces, camera, &thresholds, style);
+    let mut frame =
+        forest_draw::PointsFrame::new(block, surfaces, camera, &thresholds, style, None);
     if look == Look::Opaque {
         frame.ellipses().iter_mut().for_each(make_opaque);
     }
@@ -290,7 +291,7 @@ fn draw_random(block: &PointsBlock, camera: &Camera, share: f64, style: &Style) 
     };
     let cut = forest_points::select(block, camera, &all);
     // A stable order of chance: every smaller share is a part of every larger one.
-    let mut ellipses = point_ellipses(block, &cut, camera, style, &|id| chance(id) < share);
+    let mut ellipses = point_ellipses(block, &cut, camera, style, None, &|id| chance(id) < share);
     ellipses.iter_mut().for_each(|e| e.radius /= share.sqrt());
     let primitives = ellipses.len() as f64;
     let bytes = primitives * size_of::<forest_points::PointRecord>() as f64;

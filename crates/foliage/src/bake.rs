@@ -283,28 +283,25 @@ impl Packing<'_> {
         let first = vertices.len() as u32;
         let [m, n] = panel.cells;
         let golden = f64::from(number) * 0.618_033_988_749_895;
-        for j in 0..=n {
-            for i in 0..=m {
-                let (p, at_picture) = panel.corner(i, j);
-                let uv = [0, 1].map(|k| {
-                    let texel = f64::from(at[k]) + at_picture[k] * f64::from(panel.size[k]);
-                    (texel / f64::from(self.atlas[k])) as f32
-                });
-                let pivot = placed.pivot.map_or(DVec3::ZERO, |pivot| pivot - p) / self.pivot_step;
-                let limit = f64::from(i16::MAX);
-                vertices.push(VertexRecord {
-                    position: p.as_vec3().to_array(),
-                    uv,
-                    branch: placed.on.0 as u16,
-                    along: (placed.on.1 * 65535.0).round() as u16,
-                    pivot: pivot.to_array().map(|v| v.round().clamp(-limit, limit) as i16),
-                    phase: (golden.fract() * 65536.0) as u16,
-                    normal: encode_axis((p - self.crown).normalize_or(DVec3::Y)),
-                    openness: (placed.openness * 255.0).round() as u8,
-                    flutter: if placed.pivot.is_some() { u8::MAX } else { 0 },
-                    color: [u8::MAX; 4],
-                });
-            }
+        for ((p, at_picture), along) in panel.corners().zip(&placed.along) {
+            let uv = [0, 1].map(|k| {
+                let texel = f64::from(at[k]) + at_picture[k] * f64::from(panel.size[k]);
+                (texel / f64::from(self.atlas[k])) as f32
+            });
+            let pivot = placed.pivot.map_or(DVec3::ZERO, |pivot| pivot - p) / self.pivot_step;
+            let limit = f64::from(i16::MAX);
+            vertices.push(VertexRecord {
+                position: p.as_vec3().to_array(),
+                uv,
+                branch: placed.on as u16,
+                along: (along * 65535.0).round() as u16,
+                pivot: pivot.to_array().map(|v| v.round().clamp(-limit, limit) as i16),
+                phase: (golden.fract() * 65536.0) as u16,
+                normal: encode_axis((p - self.crown).normalize_or(DVec3::Y)),
+                openness: (placed.openness * 255.0).round() as u8,
+                flutter: if placed.pivot.is_some() { u8::MAX } else { 0 },
+                color: [u8::MAX; 4],
+            });
         }
         for j in 0..n {
             for i in 0..m {

@@ -1,5 +1,6 @@
 //! Leaves: what hangs together of leaf triangles, each flat and fixed to a branch.
 
+use crate::hang::Grown;
 use crate::tensor::{NormalTensor, principal_axes};
 use crate::weld::Welded;
 use forest_soup::TriangleSoup;
@@ -25,6 +26,13 @@ pub(crate) struct Leaf {
     pub(crate) on: (u32, f32),
     /// The corner by which it hangs.
     pub(crate) pivot: DVec3,
+}
+
+impl Leaf {
+    /// Its part of what a card shows.
+    pub(crate) fn grown(&self) -> Grown {
+        Grown { place: self.center, area: self.area, on: self.on }
+    }
 }
 
 /// From this share of its area that faces one way a leaf is flat enough for one card.

@@ -1,5 +1,7 @@
 //! One level: thick branches, sheets of thin ones, cards of leaves.
 
+use crate::branch::OnBranch;
+use crate::hang::{Grown, holder, shares};
 use crate::header::WoodWay;
 use crate::leaf::{Card, Leaf, cards, clusters};
 use crate::mesh::Mesh;
@@ -26,8 +28,9 @@ pub(crate) struct Tree<'a> {
 /// A panel in the tree.
 pub(crate) struct Placed {
     pub(crate) panel: Panel,
-    /// Branch record and share of its length.
-    pub(crate) on: (u32, f32),
+    /// The branch record that moves it, and the share of its length of each corner of the grid.
+    pub(crate) on: u32,
+    pub(crate) along: Vec<f32>,
     /// Where it hangs; leaves turn about it, sheets do not turn.
     pub(crate) pivot: Option<DVec3>,
     pub(crate) openness: f64,
@@ -100,15 +103,12 @@ impl Tree<'_> {
             }
         }
         let sheets = large.into_par_iter().flat_map_iter(|(g, triangles)| {
-            let branch = &wood.branches.branches[g as usize];
-            let at = 0.5 * branch.length();
-            let on = wood.rig.place(crate::branch::OnBranch { branch: g, at });
-            sheets(soup, surfaces, &triangles, texel).into_iter().map(move |panel| Placed {
-                on,
-                pivot: None,
-                openness: self.openness(&panel),
-                panel,
-            })
+            // The branch itself moves a sheet, so that its base stays where it grows.
+            let on = wood.rig.place(OnBranch { branch: g, at: 0.0 }).0;
+            let grown = self.grown(&triangles);
+            sheets(soup, surfaces, &triangles, texel)
+                .into_iter()
+                .map(move |panel| self.placed(panel, on, &grown, None))
         });
         let mut panels: Vec<Placed> = sheets.collect();
         let sheets = panels.len() as u32;
@@ -129,7 +129,7 @@ impl Tree<'_> {
             center += (a + b + c) / 3.0 * (0.5 * cross.length());
         }
         let base = &self.wood.branches.branches[branch as usize];
-        let middle = crate::branch::OnBranch { branch, at: 0.5 * base.length() };
+        let middle = OnBranch { branch, at: 0.5 * base.length() };
         Leaf {
             triangles,
             center: center / tensor.area.max(f64::MIN_POSITIVE),
@@ -140,6 +140,26 @@ impl Tree<'_> {
             on: self.wood.rig.place(middle),
             pivot: base.line[0],
         }
+    }
+
+    /// Where triangles of wood grow.
+    fn grown(&self, triangles: &[u32]) -> Vec<Grown> {
+        let grown = |&i: &u32| {
+            let corners = self.soup.corners(i as usize).map(|p| p.as_dvec3());
+            let [a, b, c] = corners;
+            Grown {
+                place: corners.iter().sum::<DVec3>() / 3.0,
+                area: 0.5 * (b - a).cross(c - a).length(),
+                on: self.wood.rig.place(self.wood.corners(i)[0]),
+            }
+        };
+        triangles.iter().map(grown).collect()
+    }
+
+    fn placed(&self, panel: Panel, on: u32, grown: &[Grown], pivot: Option<DVec3>) -> Placed {
+        let corners: Vec<DVec3> = panel.corners().map(|c| c.0).collect();
+        let along = shares(&self.wood.rig.records, on, grown, &corners, panel.texel);
+        Placed { on, along, pivot, openness: self.openness(&panel), panel }
     }
 
     /// Share of the sky that a panel sees: its middle, and halfway to its corners.
@@ -164,24 +184,12 @@ impl Tree<'_> {
             let weighted =
                 card.leaves.iter().map(|&i| all[i as usize].pivot * all[i as usize].area);
             let pivot = weighted.sum::<DVec3>() / area.max(f64::MIN_POSITIVE);
-            let openness = self.openness(&panel);
-            Some(Placed { on: main_branch(&all, card), pivot: Some(pivot), openness, panel })
+            let grown: Vec<Grown> = card.leaves.iter().map(|&i| all[i as usize].grown()).collect();
+            let on = holder(&self.wood.rig.records, &grown);
+            Some(self.placed(panel, on, &grown, Some(pivot)))
         });
         placed.collect()
     }
-}
-
-/// The branch that holds most of a card's leaves, and where they hang on it in the mean.
-fn main_branch(leaves: &[Leaf], card: &Card) -> (u32, f32) {
-    let mut sums: hashbrown::HashMap<u32, (f64, f64)> = hashbrown::HashMap::new();
-    for leaf in card.leaves.iter().map(|&i| &leaves[i as usize]) {
-        let sum = sums.entry(leaf.on.0).or_default();
-        *sum = (sum.0 + leaf.area, sum.1 + leaf.area * f64::from(leaf.on.1));
-    }
-    let most = sums.into_iter().max_by(|a, b| a.1.0.total_cmp(&b.1.0).then(b.0.cmp(&a.0)));
-    most.map_or((0, 0.0), |(branch, (area, at))| {
-        (branch, (at / area.max(f64::MIN_POSITIVE)) as f32)
-    })
 }
 
 fn extent(soup: &TriangleSoup, triangles: &[u32]) -> f64 {

@@ -142,4 +142,10 @@ impl Panel {
         let local = DVec3::new((2.0 * at.x - 1.0) * half.x, (1.0 - 2.0 * at.y) * half.y, height);
         (self.center + self.axes * local, at)
     }
+
+    /// All corners of the grid, row by row.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = (DVec3, DVec2)> {
+        let [m, n] = self.cells;
+        (0..=n).flat_map(move |j| (0..=m).map(move |i| self.corner(i, j)))
+    }
 }

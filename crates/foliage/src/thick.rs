@@ -58,17 +58,15 @@ pub(crate) fn thick(
 
 /// The source's triangles of these branches.
 fn whole(soup: &TriangleSoup, wood: &Wood, which: &[u32]) -> Mesh {
-    let welded: HashMap<u32, usize> = wood.welded.sources.iter().copied().zip(0..).collect();
     let mut numbers: HashMap<u32, u32> = HashMap::new();
     let mut out = Mesh::default();
     for &b in which {
         for &i in &wood.triangles[b as usize] {
-            let corners = wood.welded.triangles[welded[&i]];
+            let corners = wood.corners(i);
             let own = soup.triangles[i as usize];
             let t = [0, 1, 2].map(|k| {
                 *numbers.entry(own[k]).or_insert_with(|| {
-                    let on = wood.places[corners[k] as usize];
-                    out.vertices.push(vertex(soup, own[k] as usize, on));
+                    out.vertices.push(vertex(soup, own[k] as usize, corners[k]));
                     out.vertices.len() as u32 - 1
                 })
             });

@@ -80,6 +80,12 @@ impl Wood {
         }
     }
 
+    /// Where the corners of triangle `source` of the soup lie, which is wood.
+    pub(crate) fn corners(&self, source: u32) -> [OnBranch; 3] {
+        let number = self.welded.sources.binary_search(&source).expect("a triangle of wood");
+        self.welded.triangles[number].map(|v| self.places[v as usize])
+    }
+
     /// Of each branch, the group of thin ones that it belongs to: the number of the first of them on
     /// the way from the trunk; `None` if it is thick. Thin are branches whose radius is below
     /// `thinnest` at the base, with all that grows from them.

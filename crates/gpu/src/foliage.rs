@@ -8,8 +8,9 @@ use crate::frame::{FrameUniform, Stage};
 use crate::materials::MaterialTables;
 use crate::shader::Shader;
 use crate::target::{COLOR, DEPTH};
+use crate::wind::WindModel;
 use bytemuck::{Pod, Zeroable};
-use forest_foliage::{BranchPose, FoliageBlock, LevelHeader, Posed, VertexRecord, Wind};
+use forest_foliage::{FoliageBlock, LevelHeader, Posed, VertexRecord};
 use forest_pack::Pack;
 use forest_points::UvRange;
 use forest_raster::{Light, SHADOW_BIAS, SHADOW_SIDE, sun_camera};
@@ -79,7 +80,7 @@ pub(crate) struct FoliageModel<'p> {
     /// First vertex and triangle of each level.
     firsts: Vec<[u32; 2]>,
     uniforms: [Buffer; MOST_LAYERS],
-    poses: Buffer,
+    pub(crate) wind: WindModel,
     groups: [BindGroup; MOST_LAYERS],
     shadow: Shadow,
     /// Levels of the last frame.
@@ -107,9 +108,7 @@ impl<'p> FoliageModel<'p> {
         let indices: Vec<&[u8]> = block.indices.iter().map(|t| bytemuck::cast_slice(t)).collect();
         let vertices = gpu.storage("vertices", &vertices)?;
         let indices = gpu.storage("indices", &indices)?;
-        let branches = gpu.storage("branches", &[bytemuck::cast_slice(block.branches)])?;
-        let bytes = (block.branches.len() * size_of::<BranchPose>()) as u64;
-        let poses = gpu.buffer("poses of branches", bytes, BufferUsages::STORAGE)?;
+        let wind = WindModel::load(gpu, &block)?;
         let size = size_of::<FoliageUniform>() as u64;
         let uniform = || gpu.buffer("foliage", size, BufferUsages::UNIFORM);
         let (uniforms, shadow_uniforms) = ([uniform()?, uniform()?], [uniform()?, uniform()?]);
@@ -132,9 +131,9 @@ impl<'p> FoliageModel<'p> {
                 indices.as_entire_binding(),
                 tables.materials.as_entire_binding(),
                 tables.images.as_entire_binding(),
-                branches.as_entire_binding(),
+                wind.branches.as_entire_binding(),
                 BindingResource::TextureView(&tables.sheet),
-                poses.as_entire_binding(),
+                wind.poses.as_entire_binding(),
                 uniform.as_entire_binding(),
                 BindingResource::TextureView(&dictionary),
                 view.as_entire_binding(),
@@ -158,7 +157,7 @@ impl<'p> FoliageModel<'p> {
             drawn: false,
         };
         let layers = Vec::with_capacity(MOST_LAYERS);
-        Ok(Self { block, firsts, uniforms, poses, groups, shadow, layers })
+        Ok(Self { block, firsts, uniforms, wind, groups, shadow, layers })
     }
 
     pub(crate) fn stage(&self) -> Stage {
@@ -166,12 +165,12 @@ impl<'p> FoliageModel<'p> {
         Stage { middle: 0.5 * (low + high), half_diagonal: 0.5 * low.distance(high) }
     }
 
-    /// Uploads what `layers` draw for `camera`: levels and fades.
+    /// Uploads what `layers` draw for `camera`: levels and fades; branches stand as `posed`, or at rest.
     pub(crate) fn prepare(
         &mut self,
         gpu: &Gpu,
         camera: &Camera,
-        wind: &Wind,
+        posed: Option<&Posed>,
         light: &Light,
         layers: impl Iterator<Item = (usize, [f32; 2])>,
     ) {
@@ -189,10 +188,7 @@ impl<'p> FoliageModel<'p> {
             let view = sun_view(sun, camera, stage.half_diagonal, frame.range());
             gpu.queue.write_buffer(&self.shadow.view, 0, bytemuck::bytes_of(&view));
         }
-        let posed = Posed::new(&self.block, wind, 0.0, camera.eye);
-        let poses = &posed.pose().branches;
-        gpu.queue.write_buffer(&self.poses, 0, bytemuck::cast_slice(poses));
-        let (flutter, swing) = posed.flutter();
+        let (flutter, swing) = posed.map(Posed::flutter).unwrap_or_default();
         for (slot, (level, fade)) in layers.take(MOST_LAYERS).enumerate() {
             let [first_vertex, first_triangle] = self.firsts[level];
             let uniform = FoliageUniform {
@@ -203,7 +199,7 @@ impl<'p> FoliageModel<'p> {
                 first_triangle,
                 flutter,
                 swing,
-                windy: (wind.strength > 0.0).into(),
+                windy: posed.is_some().into(),
                 sunlit: self.block.header.levels[level].sunlit,
                 turning: from_eye(camera.eye),
                 zero1: 0,

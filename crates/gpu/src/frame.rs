@@ -86,6 +86,8 @@ pub(crate) struct FrameUniform {
     half_diagonal: f32,
     lean: [f32; 2],
     foot: f32,
+    bends: u32,
+    root: [f32; 3],
     zero: f32,
 }
 
@@ -133,6 +135,11 @@ impl FrameUniform {
     pub(crate) fn with_sway(self, sway: &Sway, camera: &Camera) -> Self {
         let foot = (f64::from(sway.foot) - camera.eye.y) as f32;
         Self { lean: sway.lean.to_array(), foot, ..self }
+    }
+
+    /// Of points that bend with branches whose zero is `root` in the world.
+    pub(crate) fn with_branches(self, root: DVec3, camera: &Camera) -> Self {
+        Self { bends: 1, root: (root - camera.eye).as_vec3().to_array(), ..self }
     }
 
     /// Of a parallel camera: the depth that is 1 in the depth buffer, and the range behind it.

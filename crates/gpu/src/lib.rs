@@ -63,6 +63,7 @@ mod timer;
 mod triangles;
 mod views;
 mod volume;
+mod wind;
 
 pub use auto::{Candidate, Fader, Goal, JUST_NOTICEABLE, candidates};
 pub use costs::Costs;

@@ -39,9 +39,6 @@ impl<'p> Model<'p> {
     /// when there is nothing to draw.
     pub fn load(gpu: &Gpu, renderer: &Renderer, pack: &'p Pack) -> Result<Self, GpuError> {
         let there = |is_in: bool| is_in.then_some(());
-        let points = there(PointsBlock::is_in(pack))
-            .map(|()| PointsModel::load(gpu, &renderer.points, pack))
-            .transpose()?;
         let views = there(ViewsBlock::is_in(pack))
             .map(|()| ViewsModel::load(gpu, &renderer.views, pack))
             .transpose()?;
@@ -50,6 +47,10 @@ impl<'p> Model<'p> {
             .transpose()?;
         let foliage = there(FoliageBlock::is_in(pack))
             .map(|()| FoliageModel::load(gpu, &renderer.foliage, pack))
+            .transpose()?;
+        // After what they may hang on.
+        let points = there(PointsBlock::is_in(pack))
+            .map(|()| PointsModel::load(gpu, &renderer.points, pack, foliage.as_ref()))
             .transpose()?;
         let measures = Measures::read(pack)?;
         gpu.finish()?;
@@ -146,18 +147,24 @@ impl<'p> Model<'p> {
         missing.map_or(Ok(()), |what| Err(GpuError::Missing { pack, what }))
     }
 
+    /// How branches stand in `wind`, where they are known; `None` in a calm.
+    pub(crate) fn posed(&self, wind: &Wind, camera: &Camera) -> Option<Posed> {
+        let block = self.foliage().filter(|_| wind.strength > 0.0)?;
+        Some(Posed::new(block, wind, 0.0, camera.eye))
+    }
+
     /// How the whole tree leans in `wind`, its foot in the world: the mean of what its branches do, where
     /// they are known.
-    pub(crate) fn sway(&self, wind: &Wind, camera: &Camera) -> Sway {
-        if wind.strength <= 0.0 {
-            return Sway::default();
+    pub(crate) fn sway(&self, wind: &Wind, posed: Option<&Posed>) -> Sway {
+        let [min, max] = self.bounds.map(|p| p.y as f32);
+        match self.foliage().zip(posed) {
+            _ if wind.strength <= 0.0 => Sway::default(),
+            None => Sway::new(USUAL_LIMBER, min, max - min, wind, 0.0),
+            Some((block, posed)) => {
+                let own = Sway::of(block, posed);
+                Sway { foot: (f64::from(own.foot) + block.origin().y) as f32, ..own }
+            }
         }
-        let Some(block) = self.foliage() else {
-            let [min, max] = self.bounds.map(|p| p.y as f32);
-            return Sway::new(USUAL_LIMBER, min, max - min, wind, 0.0);
-        };
-        let own = Sway::of(block, &Posed::new(block, wind, 0.0, camera.eye));
-        Sway { foot: (f64::from(own.foot) + block.origin().y) as f32, ..own }
     }
 
     pub(crate) fn stage(&self) -> &Stage {

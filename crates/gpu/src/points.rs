@@ -3,14 +3,16 @@
 use crate::bind::{self, Kind};
 use crate::device::Gpu;
 use crate::error::GpuError;
+use crate::foliage::FoliageModel;
 use crate::frame::Stage;
 use crate::renderer::Options;
 use crate::shader::Shader;
 use crate::target::{Target, TargetLayouts};
 use crate::triangles::TrianglesModel;
+use crate::wind;
 use crate::{CHUNK, MOST_LAYERS};
 use bytemuck::{Pod, Zeroable};
-use forest_foliage::Sway;
+use forest_foliage::{PointsWind, Sway};
 use forest_pack::Pack;
 use forest_points::{
     CellRecord, Cut, Order, PixelArea, PointRecord, PointsBlock, SizeCode, Thresholds,
@@ -76,6 +78,10 @@ pub(crate) struct PointsModel<'p> {
     large: Buffer,
     splat_group: BindGroup,
     draw_group: BindGroup,
+    /// What moves points, and corners of triangles.
+    wind_groups: [BindGroup; 2],
+    /// They hang on the pack's branches.
+    pub(crate) is_tied: bool,
     frame: PointsFrame,
 }
 
@@ -100,7 +106,12 @@ pub(crate) struct PointsDrawn {
 }
 
 impl<'p> PointsModel<'p> {
-    pub(crate) fn load(gpu: &Gpu, pass: &PointsPass, pack: &'p Pack) -> Result<Self, GpuError> {
+    pub(crate) fn load(
+        gpu: &Gpu,
+        pass: &PointsPass,
+        pack: &'p Pack,
+        foliage: Option<&FoliageModel>,
+    ) -> Result<Self, GpuError> {
         let block = PointsBlock::open(pack)?;
         let bytes = |n: usize, size: usize| n as u64 * MOST_LAYERS as u64 * size as u64;
         let points = gpu.storage("points", &[bytemuck::cast_slice(block.points)])?;
@@ -140,8 +151,26 @@ impl<'p> PointsModel<'p> {
                 Some(TrianglesModel::load(gpu, &pass.triangles_layout, pack, &block, &cells, None)?)
             }
         };
-        let frame = PointsFrame::default();
-        Ok(Self { block, triangles, cells, chunks, large, splat_group, draw_group, frame })
+        let hung = match foliage {
+            Some(f) => PointsWind::read(pack, &block, f.block.branches.len())?,
+            None => None,
+        };
+        let wind = foliage.map(|f| &f.wind);
+        let hung = hung.as_ref().map(|h| [&*h.points, h.corners.as_flattened()]);
+        let group = |k: usize| wind::group(gpu, &pass.wind_layout, wind.zip(hung.map(|h| h[k])));
+        let wind_groups = [group(0)?, group(1)?];
+        Ok(Self {
+            is_tied: hung.is_some(),
+            block,
+            triangles,
+            cells,
+            chunks,
+            large,
+            splat_group,
+            draw_group,
+            wind_groups,
+            frame: PointsFrame::default(),
+        })
     }
 
     /// Half the diagonal and the middle of the block.
@@ -265,6 +294,7 @@ pub(crate) struct PointsPass {
     splat_layout: BindGroupLayout,
     draw_layout: BindGroupLayout,
     triangles_layout: BindGroupLayout,
+    wind_layout: BindGroupLayout,
 }
 
 impl PointsPass {
@@ -283,8 +313,10 @@ impl PointsPass {
         let draw_layout = bind::layout(device, "points, drawn", stages, &[r, r, r, r]);
         let triangles_layout =
             bind::layout(device, "triangles", stages, &[r, r, r, r, r, Kind::TextureArray]);
-        let layout =
-            crate::pipeline::layout(device, &[frame_layout, &splat_layout, &targets.splat]);
+        let all = ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE;
+        let wind_layout = wind::layout(gpu, all);
+        let groups = [frame_layout, &splat_layout, &targets.splat, &wind_layout];
+        let layout = crate::pipeline::layout(device, &groups);
         let module = if wide { Shader::Splat64 } else { Shader::Splat32 }.module(device);
         let splat = |run: f64| {
             let most = ("SPLAT_MOST", f64::from(options.splat_most));
@@ -303,11 +335,13 @@ impl PointsPass {
         };
         let runs: &[f64] = if wide { &[0.0] } else { &[0.0, 1.0] };
         let module = Shader::Points.module(device);
-        let layout = crate::pipeline::layout(device, &[frame_layout, &draw_layout, &targets.found]);
+        let groups = [frame_layout, &draw_layout, &targets.found, &wind_layout];
+        let layout = crate::pipeline::layout(device, &groups);
         let draw = |vertex, fragment| {
             crate::pipeline::opaque(device, &module, &layout, [vertex, fragment], STRIP)
         };
-        let by_triangle = crate::pipeline::layout(device, &[frame_layout, &triangles_layout]);
+        let groups = [frame_layout, &triangles_layout, &targets.found, &wind_layout];
+        let by_triangle = crate::pipeline::layout(device, &groups);
         Self {
             splat: runs.iter().map(|run| splat(*run)).collect(),
             large: draw("large_vertex", "large_fragment"),
@@ -322,6 +356,7 @@ impl PointsPass {
             splat_layout,
             draw_layout,
             triangles_layout,
+            wind_layout,
         }
     }
 
@@ -341,13 +376,16 @@ impl PointsPass {
             pass.set_bind_group(0, frame_group, &[]);
             pass.set_bind_group(1, &model.splat_group, &[]);
             pass.set_bind_group(2, &target.splat_group, &[]);
+            pass.set_bind_group(3, &model.wind_groups[0], &[]);
             pass.dispatch_workgroups(across, down, 1);
         }
     }
 
     /// Draws triangles, large points, and what the splats found.
     pub(crate) fn draw(&self, pass: &mut RenderPass, model: &PointsModel, target: &Target) {
+        pass.set_bind_group(2, &target.found_group, &[]);
         if let Some(triangles) = &model.triangles {
+            pass.set_bind_group(3, &model.wind_groups[1], &[]);
             pass.set_pipeline(&self.triangles);
             pass.set_bind_group(1, triangles.group(), &[]);
             for (range, cell) in &model.frame.draws {
@@ -355,7 +393,7 @@ impl PointsPass {
             }
         }
         pass.set_bind_group(1, &model.draw_group, &[]);
-        pass.set_bind_group(2, &target.found_group, &[]);
+        pass.set_bind_group(3, &model.wind_groups[0], &[]);
         pass.set_pipeline(&self.large);
         pass.draw_indirect(&model.large, 0);
         pass.set_pipeline(&self.small);

@@ -12,7 +12,7 @@ use crate::target::{Target, TargetLayouts};
 use crate::timer::Timer;
 use crate::views::ViewsPass;
 use crate::volume::VolumePass;
-use forest_foliage::Sway;
+use forest_foliage::{Posed, Sway};
 use wgpu::{
     BindGroup, Buffer, BufferUsages, Color, CommandEncoder, LoadOp, Operations,
     RenderPassColorAttachment, RenderPassDepthStencilAttachment, RenderPassDescriptor,
@@ -121,11 +121,18 @@ impl Renderer {
     ) -> Result<Drawn, GpuError> {
         model.check_layers(frame.layers)?;
         let samples = supersampled(&frame.camera, target.side);
-        let sway = model.sway(&frame.wind, &frame.camera);
-        let uniform = FrameUniform::new(&samples, &frame.light, model.stage());
-        let uniform = uniform.with_sway(&sway, &samples);
+        let posed = model.posed(&frame.wind, &frame.camera);
+        let sway = model.sway(&frame.wind, posed.as_ref());
+        let mut uniform = FrameUniform::new(&samples, &frame.light, model.stage());
+        uniform = uniform.with_sway(&sway, &samples);
+        if let Some((foliage, posed)) = model.foliage.as_ref().zip(posed.as_ref()) {
+            foliage.wind.prepare(gpu, posed);
+            if model.points.as_ref().is_some_and(|p| p.is_tied) {
+                uniform = uniform.with_branches(foliage.block.origin(), &samples);
+            }
+        }
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
-        let drawn = prepare(gpu, model, &samples, frame, &sway);
+        let drawn = prepare(gpu, model, &samples, frame, posed.as_ref(), &sway);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         if let Some(timer) = timer {
             timer.begin(&mut encoder);
@@ -190,6 +197,7 @@ fn prepare(
     model: &mut Model,
     samples: &forest_soup::Camera,
     frame: &Frame,
+    posed: Option<&Posed>,
     sway: &Sway,
 ) -> Drawn {
     let mut drawn = Drawn::default();
@@ -200,6 +208,8 @@ fn prepare(
             _ => None,
         });
         if chosen.clone().next().is_some() {
+            // What hangs on branches does not lean besides.
+            let sway = if model.is_tied { &Sway::default() } else { sway };
             model.prepare(gpu, &frame.camera, sway, chosen.take(MOST_LAYERS));
             let took = model.drawn();
             drawn.points += took.points;
@@ -226,7 +236,7 @@ fn prepare(
             _ => None,
         });
         if chosen.clone().next().is_some() {
-            model.prepare(gpu, &frame.camera, &frame.wind, &frame.light, chosen);
+            model.prepare(gpu, &frame.camera, posed, &frame.light, chosen);
             drawn.triangles += model.triangles();
             drawn.bytes += model.bytes();
             drawn.calls += model.calls();

@@ -9,6 +9,8 @@ use wgpu::{Device, ShaderModule, ShaderModuleDescriptor, ShaderSource};
 
 const COMMON: &str = include_str!("wgsl/common.wgsl");
 const CELL: &str = include_str!("wgsl/cell.wgsl");
+const WIND: &str = include_str!("wgsl/wind.wgsl");
+const BEND: &str = include_str!("wgsl/bend.wgsl");
 const POINTS: &str = include_str!("wgsl/points.wgsl");
 const LIT_BLOCK: &str = include_str!("wgsl/lit_block.wgsl");
 const CHUNK_OF: &str = include_str!("wgsl/chunk.wgsl");
@@ -63,24 +65,23 @@ impl Shader {
     pub(crate) fn text(self) -> String {
         const SPLAT: &str = include_str!("wgsl/splat.wgsl");
         let parts: &[&str] = match self {
-            Self::Splat64 => {
-                &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, SPLAT, KEEP64]
-            }
-            Self::Splat32 => {
-                &[COMMON, LIT_BLOCK, CELL, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, SPLAT, KEEP32]
-            }
+            Self::Splat64 => &[
+                COMMON, LIT_BLOCK, CELL, WIND, BEND, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX,
+                SPLAT, KEEP64,
+            ],
+            Self::Splat32 => &[
+                COMMON, LIT_BLOCK, CELL, WIND, BEND, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX,
+                SPLAT, KEEP32,
+            ],
             Self::Points => {
                 let small = include_str!("wgsl/points_small.wgsl");
-                &[COMMON, LIT_BLOCK, CELL, POINTS, LARGE, small]
+                &[COMMON, LIT_BLOCK, CELL, WIND, BEND, POINTS, LARGE, small]
             }
             Self::Triangles => {
                 let block = include_str!("wgsl/triangles_block.wgsl");
-                &[COMMON, LIT_BLOCK, CELL, SURFACE, TRIANGLES, block]
+                &[COMMON, LIT_BLOCK, CELL, WIND, BEND, SURFACE, TRIANGLES, block]
             }
-            Self::Foliage => {
-                let wind = include_str!("wgsl/wind.wgsl");
-                &[COMMON, SURFACE, wind, include_str!("wgsl/foliage.wgsl")]
-            }
+            Self::Foliage => &[COMMON, SURFACE, WIND, include_str!("wgsl/foliage.wgsl")],
             Self::Views => &[COMMON, LIT_BLOCK, TILE, include_str!("wgsl/views.wgsl")],
             Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],
             Self::Present => &[include_str!("wgsl/present.wgsl")],
@@ -102,6 +103,7 @@ impl Step {
         const LIGHT: &str = include_str!("wgsl/landscape/light.wgsl");
         const NEARNESS: &str = include_str!("wgsl/landscape/nearness.wgsl");
         const TREE: &str = include_str!("wgsl/landscape/tree.wgsl");
+        const UNBENT: &str = include_str!("wgsl/landscape/unbent.wgsl");
         const BOARDS: &str = include_str!("wgsl/landscape/boards.wgsl");
         const TREES: &str = include_str!("wgsl/landscape/trees.wgsl");
         let keep = |wide| if wide { KEEP64 } else { KEEP32 };
@@ -111,24 +113,31 @@ impl Step {
             Self::Nearness => &[include_str!("wgsl/landscape/near.wgsl")],
             Self::Choose(wide) => {
                 let choose = include_str!("wgsl/landscape/choose.wgsl");
-                let shared = [LIGHT, CELL, POINTS, CHUNK_OF, SPLAT_BOX, NEARNESS, TREE, TREES];
+                let shared =
+                    [LIGHT, CELL, UNBENT, POINTS, CHUNK_OF, SPLAT_BOX, NEARNESS, TREE, TREES];
                 return [COMMON, &shared.concat(), BOARDS, choose, keep(wide)].concat();
             }
             Self::Sort => return [BOARDS, include_str!("wgsl/landscape/sort.wgsl")].concat(),
             Self::Between => return include_str!("wgsl/landscape/steps.wgsl").into(),
             Self::Splat(wide) => {
                 let splat = include_str!("wgsl/landscape/splat.wgsl");
-                let shared = [LIGHT, CELL, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, NEARNESS];
+                let shared =
+                    [LIGHT, CELL, UNBENT, POINTS, CHUNK_OF, LARGE_LIST, SPLAT_BOX, NEARNESS];
                 return [COMMON, &shared.concat(), splat, keep(wide)].concat();
             }
             Self::Resolve => &[LIGHT, include_str!("wgsl/landscape/resolve.wgsl")],
             Self::Impostors => {
                 &[LIGHT, CELL, TREE, TILE, include_str!("wgsl/landscape/impostor.wgsl")]
             }
-            Self::Large => &[LIGHT, CELL, POINTS, LARGE],
-            Self::Triangles => {
-                &[LIGHT, CELL, SURFACE, TRIANGLES, include_str!("wgsl/landscape/triangles.wgsl")]
-            }
+            Self::Large => &[LIGHT, CELL, UNBENT, POINTS, LARGE],
+            Self::Triangles => &[
+                LIGHT,
+                CELL,
+                UNBENT,
+                SURFACE,
+                TRIANGLES,
+                include_str!("wgsl/landscape/triangles.wgsl"),
+            ],
         };
         [COMMON, &parts.concat()].concat()
     }

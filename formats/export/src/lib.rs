@@ -2,7 +2,8 @@
 //!
 //! [`for_engine`] writes the textures and the side file that the impostor shaders of Unreal, Godot
 //! and three.js read; [`plain()`] writes PNG, EXR or KTX2 for any reader; [`contact_sheet`] a sheet for
-//! people; [`photographs()`] a capture for NeRF tools; [`splats`] points as Gaussian splats. Nothing touches the disk: an export is a list of [`ExportFile`]s.
+//! people; [`photographs()`] a capture for NeRF tools; [`splats`] points as Gaussian splats; [`levels`]
+//! foliage as a glb with all its levels, and [`pivots()`] its branches as textures. Nothing touches the disk: an export is a list of [`ExportFile`]s.
 //!
 //! ```
 //! use forest_export::{Engine, for_engine, tiles};
@@ -42,18 +43,22 @@
 
 mod engine;
 mod error;
+mod glb;
 mod grid;
 mod ktx2;
 mod photographs;
 mod picture;
+mod pivots;
 mod plain;
 mod ply;
 mod sheet;
 
 pub use engine::{Engine, TileFrame, for_engine, tiles};
 pub use error::ExportError;
+pub use glb::levels;
 pub use photographs::photographs;
 pub use picture::ExportFile;
+pub use pivots::pivots;
 pub use plain::{PlainFormat, plain};
 pub use ply::splats;
 pub use sheet::contact_sheet;

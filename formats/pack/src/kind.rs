@@ -61,6 +61,10 @@ pub const FOLIAGE_INDICES: u16 = 82;
 pub const FOLIAGE_ATLAS: u16 = 83;
 /// Branches as wind moves them, 64 bytes each.
 pub const WIND_BRANCHES: u16 = 96;
+/// What moves each point, 4 bytes each.
+pub const WIND_POINTS: u16 = 97;
+/// What moves each corner of the points' triangles, 12 bytes a triangle.
+pub const WIND_TRIANGLES: u16 = 98;
 
 /// Name of a kind for people; unknown kinds are named by number.
 pub fn name(kind: u16) -> String {
@@ -94,6 +98,8 @@ pub fn name(kind: u16) -> String {
         FOLIAGE_INDICES => "foliage.indices".into(),
         FOLIAGE_ATLAS => "foliage.atlas".into(),
         WIND_BRANCHES => "wind.branches".into(),
+        WIND_POINTS => "wind.points".into(),
+        WIND_TRIANGLES => "wind.triangles".into(),
         other => format!("kind-{other}"),
     }
 }

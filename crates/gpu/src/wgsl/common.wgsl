@@ -29,6 +29,9 @@ struct Frame {
     // How the block leans in the wind, and the height of its foot from the eye.
     lean: vec2f,
     foot: f32,
+    // 1 if points bend with the branches of a block whose zero is at `root` from the eye.
+    bends: u32,
+    root: vec3f,
     zero: f32,
 }
 

@@ -33,10 +33,11 @@ fn is_cut(cell: Cell, p: vec4u) -> bool {
     return cell.origin.y + f32(p.x >> 16u) * cell.step < cell.cut;
 }
 
-fn ellipse(cell: Cell, p: vec4u) -> Ellipse {
-    let place = place_in(cell, vec3u(p.x & 0xffffu, p.x >> 16u, p.y & 0xffffu));
+// Of point number `index` of the array.
+fn ellipse(cell: Cell, index: u32, p: vec4u) -> Ellipse {
+    let place = bent(index, place_in(cell, vec3u(p.x & 0xffffu, p.x >> 16u, p.y & 0xffffu)));
     let at = project(place);
-    let axis = point_axis(cell.turn, p);
+    let axis = bent_axis(index, point_axis(cell.turn, p));
     var e: Ellipse;
     e.center = at.xy;
     e.depth = at.z;
@@ -62,10 +63,10 @@ fn contains(e: Ellipse, at: vec2f) -> bool {
 }
 
 // Lit colour of a point that is turned by `turn` and is seen at `at` in depth `depth`.
-fn point_color(turn: vec2f, clump: f32, p: vec4u, at: vec2f, depth: f32) -> vec4f {
+fn point_color(turn: vec2f, clump: f32, index: u32, p: vec4u, at: vec2f, depth: f32) -> vec4f {
     let rgb = srgb_to_linear(vec3f(vec3u(p.z & 0xffu, (p.z >> 8u) & 0xffu, (p.z >> 16u) & 0xffu)) / 255.0);
     let place = unproject(at, depth);
-    let axis = point_axis(turn, p);
+    let axis = bent_axis(index, point_axis(turn, p));
     let normal = select(axis, -axis, dot(axis, to_eye(place)) < 0.0);
     let seen = seen_at(place) * exp(-clump);
     return vec4f(rgb * light(normal, seen.x, seen.y * skyward(normal)), 1.0);

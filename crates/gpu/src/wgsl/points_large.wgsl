@@ -20,7 +20,7 @@ fn large_vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
         return out;
     }
     out.place = list.points[instance];
-    let e = ellipse(cells[out.place.y], points[out.place.x]);
+    let e = ellipse(cells[out.place.y], out.place.x, points[out.place.x]);
     let corner = vec2f(f32(vertex & 1u), f32(vertex >> 1u)) * 2.0 - 1.0;
     out.position = flat_clip(e.center + corner * e.reach, depth_value(e.depth));
     return out;
@@ -30,11 +30,11 @@ fn large_vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) ins
 fn large_fragment(in: Quad) -> @location(0) vec4f {
     let cell = cells[in.place.y];
     let p = points[in.place.x];
-    let e = ellipse(cell, p);
+    let e = ellipse(cell, in.place.x, p);
     let at = vec2u(in.position.xy);
     let id = point_number(cell, in.place.x);
     if !(contains(e, in.position.xy) && covers(id, at, e.opacity) && fades_in(cell.fade, at)) {
         discard;
     }
-    return point_color(cell.turn, cell.clump, p, in.position.xy, e.depth);
+    return point_color(cell.turn, cell.clump, in.place.x, p, in.position.xy, e.depth);
 }

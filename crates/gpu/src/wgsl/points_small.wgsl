@@ -22,5 +22,5 @@ fn small_fragment(@builtin(position) position: vec4f) -> Sample {
         discard;
     }
     let value = bitcast<f32>(best.y);
-    return Sample(point_color(vec2f(1.0, 0.0), 0.0, points[~best.x], position.xy, depth_of(value)), value);
+    return Sample(point_color(vec2f(1.0, 0.0), 0.0, ~best.x, points[~best.x], position.xy, depth_of(value)), value);
 }

@@ -19,7 +19,7 @@ fn splat(
     if !is_drawn(cell, p.w) {
         return;
     }
-    let e = ellipse(cell, p);
+    let e = ellipse(cell, index, p);
     if is_behind(e.depth) {
         return;
     }

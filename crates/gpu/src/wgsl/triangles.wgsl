@@ -22,7 +22,7 @@ fn half_word(triangle: u32, n: u32) -> u32 {
     return (triangles[triangle * 10u + (n >> 1u)] >> ((n & 1u) * 16u)) & 0xffffu;
 }
 
-// Corner number `index` of all, in a cell.
+// Corner number `index` of the array, in a cell.
 fn corner(index: u32, cell_index: u32) -> Corner {
     let triangle = index / 3u;
     let first = (index % 3u) * 6u;
@@ -33,7 +33,7 @@ fn corner(index: u32, cell_index: u32) -> Corner {
         half_word(triangle, first + 1u),
         half_word(triangle, first + 2u),
     );
-    let place = place_in(cell, steps);
+    let place = bent(index, place_in(cell, steps));
     let along = dot(place, frame.forward);
     let off = vec2f(dot(place, frame.right), -dot(place, frame.down)) * frame.scale * 2.0 / frame.size;
     if frame.parallel != 0u {
@@ -46,7 +46,7 @@ fn corner(index: u32, cell_index: u32) -> Corner {
     out.uv = m.uv_min + m.uv_step
         * vec2f(f32(half_word(triangle, first + 3u)), f32(half_word(triangle, first + 4u)));
     let axis = half_word(triangle, first + 5u);
-    out.normal = turned(cell.turn, decode_axis(vec2u(axis & 0xffu, axis >> 8u)));
+    out.normal = bent_axis(index, turned(cell.turn, decode_axis(vec2u(axis & 0xffu, axis >> 8u))));
     out.tint = vec4f(1.0);
     if (m.flags & 2u) != 0u {
         let c = unpack4x8unorm(colors[index]);

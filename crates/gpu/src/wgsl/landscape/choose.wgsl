@@ -179,7 +179,7 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32,
         if !is_drawn(cell, p.w) || is_cut(cell, p) {
             continue;
         }
-        var e = ellipse(cell, p);
+        var e = ellipse(cell, index, p);
         if is_behind(e.depth) {
             continue;
         }
@@ -198,7 +198,7 @@ fn splat_few(t: Tree, s: Species, stock: Stock, fine: i32, count: u32, cut: f32,
         if e.opacity == 0u || box.x > box.z || box.y > box.w {
             continue;
         }
-        let color = point_color(cell.turn, cell.clump, p, e.center, e.depth).rgb;
+        let color = point_color(cell.turn, cell.clump, index, p, e.center, e.depth).rgb;
         splat_box(e, point_number(cell, index), cell.fade, box, pack_color(color));
     }
 }

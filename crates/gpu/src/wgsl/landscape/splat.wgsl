@@ -31,7 +31,7 @@ fn splat(
     if !is_drawn(cell, p.w) || is_cut(cell, p) {
         return;
     }
-    let e = ellipse(cell, p);
+    let e = ellipse(cell, index, p);
     if is_behind(e.depth) {
         return;
     }
@@ -46,6 +46,6 @@ fn splat(
     if u32(n.x * n.y) > SPLAT_MOST && listed(index, chunk.cell) {
         return;
     }
-    let color = point_color(cell.turn, cell.clump, p, e.center, e.depth).rgb;
+    let color = point_color(cell.turn, cell.clump, index, p, e.center, e.depth).rgb;
     splat_box(e, point_number(cell, index), cell.fade, box, pack_color(color));
 }

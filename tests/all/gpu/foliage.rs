@@ -1,0 +1,165 @@
+//! Foliage is drawn as the CPU draws it, and bends in the wind; all representations lean alike; fades
+//! share the samples.
+
+use super::{Device, SIDE, assert_same, cameras, thresholds, tree};
+use forest_draw::{FoliageScene, draw_bent_points, draw_points, read_surfaces};
+use forest_foliage::{BentPoints, FoliageBlock, FoliageOptions, PointsWind, Pose, Wind};
+use forest_gpu::{Frame, Layer, Model, Options, What};
+use forest_points::{BakeOptions, PointsBlock, Thresholds};
+use forest_raster::{Light, Sampling, Style};
+use forest_soup::Camera;
+use forest_tests::pictures::rmse;
+use forest_tests::{bake_bytes, bake_foliage, bake_views, bake_volume, merged, open};
+use forest_views::{Directions, Dome, Lookup, ViewsOptions};
+use forest_volume::{Blending, Detail, Stand, VolumeOptions};
+
+/// Foliage, at rest and bent by the wind.
+#[test]
+fn foliage_is_drawn_as_the_cpu_draws_it() {
+    let device = Device::new(Options::default());
+    let soup = tree("broadleaf_young.gltf");
+    for blocks in [true, false] {
+        let options = FoliageOptions { blocks, ..FoliageOptions::default() };
+        let pack = open(&bake_foliage(&soup, &options).unwrap().0).unwrap();
+        let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+        let block = FoliageBlock::open(&pack).unwrap();
+        let scene = FoliageScene::read(&block).unwrap();
+        let gale = Wind { strength: 1.0, time: 2.2, ..Wind::default() };
+        for (c, camera) in cameras(model.bounds()).iter().enumerate() {
+            let level = c % 3;
+            for (w, wind) in [Wind::default(), gale].into_iter().enumerate() {
+                let style = Style { sampling: Sampling::MIDDLE, light: Light::MORNING };
+                let cpu = scene.draw(camera, level, &wind, &style);
+                let layers = [Layer::whole(What::Foliage(level))];
+                let frame = Frame { camera: *camera, light: Light::MORNING, wind, layers: &layers };
+                let gpu = device.draw_frame(&mut model, &frame).0;
+                assert_same(&format!("foliage-{blocks}-{c}-{w}"), &gpu, &cpu);
+            }
+        }
+    }
+}
+
+/// Points and triangles, bent by the wind branch by branch.
+#[test]
+fn bent_points_are_those_of_draw() {
+    let device = Device::new(Options::default());
+    let soup = tree("broadleaf_young.gltf");
+    let pack = open(&merged(&[
+        bake_foliage(&soup, &FoliageOptions::default()).unwrap().0,
+        bake_bytes(&soup, &BakeOptions::default()).unwrap().0,
+    ]));
+    let pack = pack.unwrap();
+    let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+    let block = PointsBlock::open(&pack).unwrap();
+    let surfaces = read_surfaces(&pack, &block).unwrap();
+    let foliage = FoliageBlock::open(&pack).unwrap();
+    let wind = PointsWind::read(&pack, &block, foliage.branches.len()).unwrap().unwrap();
+    let gale = Wind { strength: 1.0, time: 2.2, ..Wind::default() };
+    let pose = Pose::new(foliage.branches, &gale, 0.0);
+    let bent = BentPoints::new(&foliage, &wind, &pose);
+    let style = Style { sampling: Sampling::MIDDLE, light: Light::MORNING };
+    let cuts = [thresholds(1.0, 16.0, 0.0), Thresholds::TRIANGLES, thresholds(900.0, 1e9, 0.0)];
+    for (c, camera) in cameras(model.bounds()).iter().enumerate() {
+        let cut = &cuts[c % 3];
+        let surfaces = surfaces.as_ref();
+        let (cpu, _) = draw_bent_points(&block, surfaces, camera, cut, &style, &bent);
+        let (still, _) = draw_points(&block, surfaces, camera, cut, &style);
+        assert!(rmse(&cpu, &still) > 0.05, "it moves");
+        let layers = [Layer::whole(What::Points(*cut))];
+        let frame = Frame { camera: *camera, light: Light::MORNING, wind: gale, layers: &layers };
+        let gpu = device.draw_frame(&mut model, &frame).0;
+        assert_same(&format!("bent-points-{c}"), &gpu, &cpu);
+    }
+}
+
+/// In the wind, a change of representation moves the tree as little as at rest.
+#[test]
+fn representations_lean_alike_in_the_wind() {
+    let device = Device::new(Options::default());
+    let soup = tree("broadleaf_young.gltf");
+    let views = ViewsOptions {
+        directions: Directions::octahedral(64, Dome::Upper),
+        texels: 128,
+        ..ViewsOptions::default()
+    };
+    let volume = VolumeOptions { levels: 6, ..VolumeOptions::default() };
+    let pack = open(&merged(&[
+        bake_foliage(&soup, &FoliageOptions::default()).unwrap().0,
+        bake_bytes(&soup, &BakeOptions { triangles: false, ..Default::default() }).unwrap().0,
+        bake_views(&soup, &views).unwrap(),
+        bake_volume(&soup, Stand::Dome { cameras: 9 }, &volume, None).unwrap().0,
+    ]));
+    let pack = pack.unwrap();
+    let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+    let camera = Camera::around(model.bounds(), [20.0, 8.0], None, [SIDE; 2]);
+    // Mean place across of what covers the upper half of the picture, in pixels.
+    let mut middle = |what: What, wind: Wind| {
+        let layers = [Layer::whole(what)];
+        let frame = Frame { camera, light: Light::Albedo, wind, layers: &layers };
+        let picture = device.draw_frame(&mut model, &frame).0;
+        let upper = picture.pixels.iter().enumerate().take((SIDE * SIDE / 2) as usize);
+        let (sum, weight) = upper.fold((0.0, 0.0), |(sum, weight), (i, p)| {
+            let a = f64::from(p[3]);
+            (sum + a * f64::from(i as u32 % SIDE), weight + a)
+        });
+        sum / weight
+    };
+    // Leaves turn to and fro besides: over some moments.
+    let mut shift = |what| {
+        let still = middle(what, Wind::default());
+        let at = |time| Wind { strength: 1.0, time, ..Wind::default() };
+        let moved = [1.1, 2.2, 3.7, 5.3, 7.2].map(|time| middle(what, at(time)) - still);
+        moved.iter().sum::<f64>() / moved.len() as f64
+    };
+    let foliage = shift(What::Foliage(0));
+    assert!(foliage.abs() > 1.0, "{foliage} px");
+    for what in [
+        What::Foliage(2),
+        What::Points(thresholds(1.0, 1e9, 0.0)),
+        What::Views(0, Lookup::Nearest),
+        What::Views(0, Lookup::Depth),
+        What::Volume(Detail::Level(5), Blending::Shares),
+    ] {
+        let own = shift(what);
+        // Levels hang on the same branches. Of the others no leaves turn, and views and volumes lean as a
+        // whole: the crown's outline moves by less than a fifth of a per cent of the tree's height, which is
+        // well below a pixel where levels change.
+        let most = if matches!(what, What::Foliage(_)) { 0.1 } else { 0.4 };
+        assert!((own - foliage).abs() < most, "{what:?}: {own} px, not {foliage}");
+    }
+}
+
+/// Two layers on complementary samples: of one level they are that level; of two, each sample is of
+/// one of them, so that no fade is denser or thinner than both its ends.
+#[test]
+fn fading_levels_share_the_samples() {
+    let soup = tree("shrub.obj");
+    let points = bake_bytes(&soup, &BakeOptions::default()).unwrap().0;
+    let foliage = bake_foliage(&soup, &FoliageOptions::default()).unwrap().0;
+    let levels = [1.0, 64.0].map(|s| What::Points(thresholds(s, 16.0 * s, 0.0)));
+    levels_share_the_samples(&points, levels);
+    levels_share_the_samples(&foliage, [0, 2].map(What::Foliage));
+}
+
+fn levels_share_the_samples(bytes: &[u8], [fine, coarse]: [What; 2]) {
+    let pack = open(bytes).unwrap();
+    let device = Device::new(Options::default());
+    let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+    let camera = cameras(model.bounds())[2];
+    let mut draw = |layers: &[Layer]| device.draw(&mut model, &camera, Light::MORNING, layers);
+    let halves =
+        |a, b, t: f32| [Layer { what: a, fade: [0.0, t] }, Layer { what: b, fade: [t, 1.0] }];
+    let (all_fine, all_coarse) = (draw(&[Layer::whole(fine)]), draw(&[Layer::whole(coarse)]));
+    assert_eq!(draw(&halves(fine, fine, 0.4)).pixels, all_fine.pixels);
+    let mut last = 0;
+    for t in [0.1, 0.35, 0.7, 0.95] {
+        let faded = draw(&halves(coarse, fine, t));
+        let mut coarse_only = 0;
+        for ((f, a), b) in faded.pixels.iter().zip(&all_fine.pixels).zip(&all_coarse.pixels) {
+            assert!(f == a || f == b, "{f:?} is neither {a:?} nor {b:?}");
+            coarse_only += usize::from(f == b && f != a);
+        }
+        assert!(coarse_only > last, "{t}");
+        last = coarse_only;
+    }
+}
