@@ -13,6 +13,7 @@ mod ground_truth; // the pictures that packs are judged against: two ways, and a
 mod hard_cases; // degenerate and extreme soups, each with its expected number
 mod invariance; // threads, places and scales that must not matter
 mod landscape; // landscapes: made, drawn, beside ground truth
+mod light; // as bright as rays with shadows say, by every representation
 mod real_trees; // trees by others, where they are present
 mod support; // temporary folders, running the program
 mod view; // forest-view: pictures, window, exit codes

@@ -12,7 +12,7 @@ use forest_draw::{
     FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
 };
 use forest_foliage::{
-    BentPoints, FoliageBlock, FoliageError, FoliageOptions, PointsWind, Pose, Wind,
+    BentPoints, CrownLight, FoliageBlock, FoliageError, FoliageOptions, PointsWind, Pose, Wind,
 };
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::{ErrorKind, Light, Measures, Need};
@@ -198,6 +198,10 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         };
         table.cheapest(&need, 0.1).or(table.best_within(&need, 1e3));
     }
+    if let Some(crown) = CrownLight::read(&pack)? {
+        let lit = crown.light(forest_raster::Light::MORNING, DVec3::X);
+        assert!(matches!(lit, forest_raster::Light::Sun(sun) if sun.sun[0].is_finite()));
+    }
     let mut drawn = if ViewsBlock::is_in(&pack) { use_views(&pack)? } else { 0 };
     drawn += if VolumeBlock::is_in(&pack) { use_volume(&pack)? } else { 0 };
     drawn += if FoliageBlock::is_in(&pack) { use_foliage(&pack)? } else { 0 };
@@ -268,7 +272,7 @@ fn use_volume(pack: &Pack) -> Result<usize, PackError> {
         let camera = Camera::new(middle + from * (distance * side), -from, projection, [8, 8]);
         for detail in [Detail::Level(2), Detail::PIXEL] {
             for blending in [Blending::Shares, Blending::Over] {
-                let (_, cost) = scene.draw(&camera, detail, blending, Sampling::MIDDLE);
+                let (_, cost) = scene.draw(&camera, detail, blending, &Sampling::MIDDLE.into());
                 drawn += cost.billboards as usize;
             }
         }

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use forest_draw::{
     FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
 };
-use forest_foliage::{BentPoints, FoliageBlock, PointsWind, Pose, Wind};
+use forest_foliage::{BentPoints, CrownLight, FoliageBlock, PointsWind, Pose, Wind};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
@@ -169,6 +169,17 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     write(args, &pictures)
 }
 
+/// The style under what the pack's crown shows of the light to an eye in this direction; `own_sky` if what
+/// is drawn knows what it sees of the sky.
+fn on_crown(pack: &Pack, style: &Style, to_eye: DVec3, own_sky: bool) -> Result<Style> {
+    let light = match CrownLight::read(pack)? {
+        Some(crown) if own_sky => crown.sunlight(style.light, to_eye),
+        Some(crown) => crown.light(style.light, to_eye),
+        None => style.light,
+    };
+    Ok(Style { light, ..*style })
+}
+
 impl Args {
     /// The foliage of a pack that its points bend with; `None` in a calm.
     fn points_in_wind<'p>(
@@ -194,6 +205,7 @@ fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resu
     let surfaces = read_surfaces(pack, &block)?;
     let [min, max] = [block.header.min, block.header.max].map(|v| block.to_world(v.into()));
     let camera = args.camera([min, max])?;
+    let style = &on_crown(pack, style, camera.to_eye(0.5 * (min + max)), false)?;
     let tied = args.points_in_wind(pack, &block)?;
     let pose = tied.as_ref().map(|(f, _)| Pose::new(f.branches, &args.wind, 0.0));
     let bent = tied.as_ref().zip(pose.as_ref()).map(|((f, w), pose)| BentPoints::new(f, w, pose));
@@ -231,6 +243,8 @@ fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resul
     let block = ViewsBlock::open(pack)?;
     let bounds = block.header.bounds.map(|b| block.center() + DVec3::from_array(b));
     let camera = args.camera(bounds)?;
+    let sky = block.header.channels.sky;
+    let style = &on_crown(pack, style, camera.to_eye(block.center()), sky)?;
     let mut pictures = Vec::new();
     for lookup in args.lookup.iter().map(|&l| Lookup::from(l)) {
         let chosen = select(&block, &camera, lookup, args.texel);
@@ -307,9 +321,15 @@ fn draw_all_volumes(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Res
     if details.is_empty() {
         details.push(Detail::Planes { texel: args.texel, fade: Detail::FADE });
     }
+    let [min, max] = block.header.bounds.map(DVec3::from_array);
+    let style = match CrownLight::read(pack)? {
+        Some(_) => &on_crown(pack, style, camera.to_eye(0.5 * (min + max)), false)?,
+        // It may be made of photographs, which have their light in them.
+        None => &style.sampling.into(),
+    };
     let mut pictures = Vec::new();
     for detail in details {
-        let (picture, drawn) = scene.draw(&camera, detail, blending, style.sampling);
+        let (picture, drawn) = scene.draw(&camera, detail, blending, style);
         if !quiet {
             eprintln!(
                 "{} cells, {} billboards, {}, coverage {:.4}",

@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     if let Some(pack) = &kept {
         let own = |k| {
             (kind::FOLIAGE_HEADER..=kind::WIND_BRANCHES).contains(&k)
-                || [kind::MATERIALS, kind::TEXTURE].contains(&k)
+                || [kind::MATERIALS, kind::TEXTURE, kind::LIGHT_CROWN].contains(&k)
         };
         target::keep_others(&mut writer, pack, kind::FOLIAGE_HEADER, own)?;
     }

@@ -2,7 +2,7 @@
 
 use crate::output;
 use anyhow::Result;
-use forest_foliage::{FoliageBlock, PointsWind};
+use forest_foliage::{CrownLight, FoliageBlock, PointsWind};
 use forest_pack::header::{self, Meta};
 use forest_pack::measures::Measures;
 use forest_pack::{Pack, PackError, SectionId, kind};
@@ -38,6 +38,7 @@ pub(crate) fn check(path: &Path) -> Result<(), PackError> {
     pack.verify()?;
     header::decode::<Meta>(&pack, SectionId::new(kind::META, 0))?;
     Measures::read(&pack)?;
+    CrownLight::read(&pack)?;
     if ViewsBlock::is_in(&pack) {
         ViewsBlock::open(&pack)?;
     }

@@ -1,12 +1,12 @@
 //! The volume representation: billboards of cells, sorted and blended.
 
 use forest_pack::PackError;
-use forest_raster::{Layer, Picture, Sampling, composite};
+use forest_raster::{Layer, Light, Picture, Style, composite};
 use forest_soup::{Camera, srgb8_to_linear};
 use forest_volume::{
     Blending, CameraShare, Detail, Item, LEAST_THROUGH, Selection, VolumeBlock, select,
 };
-use glam::{DVec2, IVec2};
+use glam::{DVec2, DVec3, IVec2};
 
 /// What a picture of a volume took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,26 +41,28 @@ impl<'a> VolumeScene<'a> {
         self.block
     }
 
-    /// Draws the tree as `camera` sees it, in the light of its photographs.
+    /// Draws the tree as `camera` sees it. Under a sun it is lit as leaves that face all ways
+    /// ([`forest_raster::scattered`]), by the estimate of [`forest_raster::Sun::seen`]; what was made of
+    /// photographs has their light in it, and is drawn as it is ([`Light::Albedo`]).
     pub fn draw(
         &self,
         camera: &Camera,
         detail: Detail,
         blending: Blending,
-        sampling: Sampling,
+        style: &Style,
     ) -> (Picture, VolumeDrawn) {
         let selection = select(self.block, camera, detail);
         let layers: Vec<Billboard> = selection
             .items
             .iter()
-            .filter_map(|item| self.layer(camera, &selection, item, blending))
+            .filter_map(|item| self.layer(camera, &selection, item, blending, style.light))
             .collect();
         let billboards = layers.iter().map(|l| l.faces.iter().flatten().count() as u64).sum();
         let header = &self.block.header;
         let bytes = billboards as f64 * self.block.billboard_bytes()
             + header.coding.atlas_bytes(header.texels) as f64;
         let drawn = VolumeDrawn { cells: selection.items.len() as u64, billboards, bytes };
-        (composite(&layers, camera, sampling), drawn)
+        (composite(&layers, camera, style.sampling), drawn)
     }
 
     fn layer(
@@ -69,10 +71,14 @@ impl<'a> VolumeScene<'a> {
         selection: &Selection,
         item: &Item,
         blending: Blending,
+        light: Light,
     ) -> Option<Billboard<'_>> {
         let lattice = self.block.lattice();
         let node = &self.block.nodes[item.level as usize][item.node as usize];
-        let (x, y, depth) = camera.project(lattice.center(item.level, node.place()));
+        let center = lattice.center(item.level, node.place());
+        let (x, y, depth) = camera.project(center);
+        let [min, max] = self.block.header.bounds.map(DVec3::from_array);
+        let sunlit = light.seen(center - 0.5 * (min + max), 0.5 * min.distance(max));
         let scale = camera.pixels_per_unit(depth);
         let mut faces = [None; 2];
         for (face, chosen) in faces.iter_mut().zip(&selection.cameras) {
@@ -87,6 +93,7 @@ impl<'a> VolumeScene<'a> {
             texels: self.block.header.texels,
             weight: item.weight,
             blending,
+            light: light.scattered(camera.to_eye(center), sunlit, 1.0),
         })
     }
 
@@ -104,7 +111,7 @@ impl<'a> VolumeScene<'a> {
         let texels = &self.texels[item.level as usize][number as usize * t2..][..t2];
         let side = self.block.lattice().cell_side(item.level);
         let half = header.cameras[chosen.camera as usize].half_size(side).map(|h| h * scale);
-        let pixels = |v: glam::DVec3| DVec2::new(v.dot(camera.right), -v.dot(camera.up));
+        let pixels = |v: DVec3| DVec2::new(v.dot(camera.right), -v.dot(camera.up));
         let (right, down) = (pixels(chosen.right), -pixels(chosen.up));
         let texel = 0.5 * f64::from(header.texels);
         Some(Face {
@@ -161,6 +168,8 @@ struct Billboard<'a> {
     texels: u32,
     weight: f32,
     blending: Blending,
+    /// Factors on its colour.
+    light: [f32; 3],
 }
 
 impl Layer for Billboard<'_> {
@@ -200,6 +209,7 @@ impl Layer for Billboard<'_> {
             let scale = alpha / color[3];
             color = color.map(|c| c * scale);
         }
+        color.iter_mut().zip(self.light).for_each(|(c, l)| *c *= l);
         color
     }
 }

@@ -66,7 +66,8 @@ pub fn matte_errors(block: &VolumeBlock, photos: &[Photograph]) -> Result<MatteE
 
 /// The volume as a photograph's camera sees it.
 pub fn drawn(scene: &VolumeScene, camera: &Camera) -> Picture {
-    scene.draw(camera, Detail::PIXEL, Blending::Shares, Sampling { side: 4, seed: 1 }).0
+    let sampling = Sampling { side: 4, seed: 1 };
+    scene.draw(camera, Detail::PIXEL, Blending::Shares, &sampling.into()).0
 }
 
 fn compare(photo: &Photograph, drawn: &Picture) -> MatteErrors {

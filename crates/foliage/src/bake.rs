@@ -2,6 +2,7 @@
 
 use crate::block::{dictionary_material, dictionary_texture, level_soup};
 use crate::branch::OnBranch;
+use crate::crown::CrownLight;
 use crate::dictionary::{Layout, MOST_SIDE, atlas, encode};
 use crate::error::FoliageError;
 use crate::fit::Brightness;
@@ -114,7 +115,7 @@ pub fn bake(
     let pictures = atlas(&panels, &layout);
     let lighting = start.elapsed();
     let start = Instant::now();
-    brighten(soup, &surfaces, &mut arrays, layout.size, &pictures[0]);
+    let crown_light = brighten(soup, &surfaces, &mut arrays, layout.size, &pictures[0]);
     let lighting = (lighting, start.elapsed());
     let start = Instant::now();
     let mut branches = [0; 4];
@@ -153,6 +154,7 @@ pub fn bake(
     writer.add(SectionId::new(kind::WIND_BRANCHES, 0), Codec::None, rows)?;
     write_materials(writer, &soup.materials, &soup.textures)?;
     header::write(writer, SectionId::new(kind::FOLIAGE_HEADER, 0), &header)?;
+    crown_light.write(writer)?;
     let texels: u64 = panels.iter().map(|p| u64::from(p.size[0]) * u64::from(p.size[1])).sum();
     let all = u64::from(layout.size[0]) * u64::from(layout.size[1]);
     Ok(BakeReport {
@@ -166,14 +168,15 @@ pub fn bake(
     })
 }
 
-/// Weighs the light on cards, so that each level is as bright as the source.
+/// Weighs the light on cards, so that each level is as bright as the source; the light on what has no shadow
+/// map.
 fn brighten(
     soup: &TriangleSoup,
     surfaces: &Surfaces,
     arrays: &mut [Arrays],
     size: [u32; 2],
     texels: &[[u8; 4]],
-) {
+) -> CrownLight {
     let (mut materials, mut textures) = (soup.materials.clone(), soup.textures.clone());
     materials.push(dictionary_material(textures.len() as u32));
     textures.push(Arc::new(dictionary_texture(size, texels.to_vec())));
@@ -188,6 +191,7 @@ fn brighten(
             v.openness = (f64::from(v.openness) * sky).round().min(255.0) as u8;
         }
     }
+    truth.crown()
 }
 
 /// Hangs leaves on the branches: each by the corner that is nearest to wood.

@@ -5,6 +5,7 @@
 //! shade each other, and those that are seen are not the mean of all: both are made good by one weight each,
 //! for which the mean light of a few pictures is that of the truth (docs/LIGHT.md).
 
+use crate::crown::CrownLight;
 use forest_raster::{
     Light, Picture, RayScene, Sampling, ShadowMap, Style, Sun, Surfaces, rasterize,
     rasterize_shadowed,
@@ -23,21 +24,50 @@ const SAMPLES: u32 = 2;
 /// Weights beyond these are not believed.
 const WEIGHTS: std::ops::RangeInclusive<f64> = 0.25..=1.5;
 
-/// The truth: mean light of pictures under each sun, and under the sky.
+/// Suns by which the light on crowns is fitted, all around the eye.
+const CROWN_SUNS: u32 = 14;
+
+/// The truth: light of pictures under each sun, and under the sky.
 pub(crate) struct Brightness {
     bounds: [DVec3; 2],
-    /// By sun: in sunlight, in skylight.
+    /// In sunlight, and in skylight.
     light: Vec<[f64; 2]>,
+    crown: Vec<Sample>,
+}
+
+/// Light of a picture in sunlight and in skylight: sums over its pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample {
+    pub(crate) to_sun: DVec3,
+    pub(crate) to_eye: DVec3,
+    /// With shadows.
+    pub(crate) truth: [f64; 2],
+    /// Without.
+    pub(crate) open: [f64; 2],
+}
+
+fn direction(yaw: f64, pitch: f64) -> DVec3 {
+    let (yaw, pitch) = (yaw.to_radians(), pitch.to_radians());
+    DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos())
 }
 
 fn setting(i: u32, bounds: [DVec3; 2]) -> (DVec3, Camera) {
-    let pitch = if i.is_multiple_of(2) { 30.0f64 } else { 55.0 }.to_radians();
-    let yaw = (f64::from(i) * 360.0 / f64::from(SUNS)).to_radians();
-    let to_sun = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos());
+    let pitch = if i.is_multiple_of(2) { 30.0 } else { 55.0 };
+    let to_sun = direction(f64::from(i) * 360.0 / f64::from(SUNS), pitch);
     // Around the tree at another pace than the sun: from before it, beside it and behind it.
     (to_sun, Camera::around(bounds, [f64::from(i) * 107.0, 10.0], None, [SIDE; 2]))
 }
 
+/// As many suns as there may be at each angle from the eye, at several heights.
+fn crown_setting(i: u32, bounds: [DVec3; 2]) -> (DVec3, Camera) {
+    let (step, side) = (f64::from(i), if i.is_multiple_of(2) { 1.0 } else { -1.0 });
+    let eye = [step * 107.0, 10.0];
+    let around = side * step * 180.0 / f64::from(CROWN_SUNS - 1);
+    let pitch = [20.0, 35.0, 60.0][i as usize % 3];
+    (direction(eye[0] + around, pitch), Camera::around(bounds, eye, None, [SIDE; 2]))
+}
+
+/// In sunlight alone, in skylight alone.
 fn styles(to_sun: DVec3) -> [Style; 2] {
     [[1.0, 0.0], [0.0, 1.0]].map(|[sun, sky]| {
         let (sun, sky) = ([sun; 3], [sky; 3]);
@@ -56,11 +86,25 @@ impl Brightness {
         let bounds = soup.bounds();
         let bounds = [bounds.min, bounds.max].map(|p| soup.origin + p);
         let rays = RayScene::new(soup, surfaces);
-        let light = (0..SUNS).map(|i| {
-            let (to_sun, camera) = setting(i, bounds);
-            styles(to_sun).map(|style| mean(&rays.picture(&camera, &style)))
-        });
-        Self { bounds, light: light.collect() }
+        let truth = |(to_sun, camera): &(DVec3, Camera)| {
+            styles(*to_sun).map(|style| mean(&rays.picture(camera, &style)))
+        };
+        let crown = |i: u32| {
+            let (to_sun, camera) = crown_setting(i, bounds);
+            let open = styles(to_sun).map(|s| mean(&rasterize(soup, surfaces, &camera, &s)));
+            let to_eye = camera.to_eye(0.5 * (bounds[0] + bounds[1]));
+            Sample { to_sun, to_eye, truth: truth(&(to_sun, camera)), open }
+        };
+        Self {
+            bounds,
+            light: (0..SUNS).map(|i| truth(&setting(i, bounds))).collect(),
+            crown: (0..CROWN_SUNS).map(crown).collect(),
+        }
+    }
+
+    /// The light on representations without shadow maps.
+    pub(crate) fn crown(&self) -> CrownLight {
+        CrownLight::fit(&self.crown)
     }
 
     /// Weights of sun and sky for the last of `level`'s materials, so that it is as bright in the mean.

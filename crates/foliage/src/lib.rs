@@ -39,6 +39,7 @@
 mod bake;
 mod block;
 mod branch;
+mod crown;
 mod dictionary;
 mod error;
 mod fit;
@@ -66,6 +67,7 @@ mod wood_graph;
 
 pub use bake::{BakeReport, bake};
 pub use block::{FoliageBlock, Mip, Posed};
+pub use crown::CrownLight;
 pub use error::FoliageError;
 pub use header::{DICTIONARY, Draw, FoliageHeader, LevelHeader, VertexRecord, WoodWay};
 pub use options::FoliageOptions;

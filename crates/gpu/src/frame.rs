@@ -1,7 +1,7 @@
 //! What a picture is made of: the camera, the light, and the layers.
 
 use bytemuck::{Pod, Zeroable};
-use forest_foliage::{Sway, Wind};
+use forest_foliage::{CrownLight, Sway, Wind};
 use forest_points::Thresholds;
 use forest_raster::Light;
 use forest_soup::{Camera, Projection};
@@ -14,7 +14,9 @@ use glam::DVec3;
 pub struct Frame<'a> {
     /// From where, with the size of the target in pixels; levels are chosen for these.
     pub camera: Camera,
-    /// The light, without shadows. Volumes are in the light of their photographs.
+    /// The light. Foliage has a shadow map; the others have the estimate of [`forest_raster::Sun::seen`], with
+    /// the shares of the pack's [`CrownLight`] if it knows them. Volumes are base colours, and lit, if it
+    /// does; else they are in the light of their photographs.
     pub light: Light,
     /// The wind that foliage stands in.
     pub wind: Wind,
@@ -88,7 +90,9 @@ pub(crate) struct FrameUniform {
     foot: f32,
     bends: u32,
     root: [f32; 3],
-    zero: f32,
+    relit: u32,
+    crown: [f32; 2],
+    zero: [f32; 2],
 }
 
 impl FrameUniform {
@@ -116,6 +120,7 @@ impl FrameUniform {
             half_diagonal: half_diagonal as f32,
             middle: vector(off),
             darkest: 1.0,
+            crown: [1.0; 2],
             ..Self::zeroed()
         };
         if let Light::Sun(sun) = light {
@@ -135,6 +140,15 @@ impl FrameUniform {
     pub(crate) fn with_sway(self, sway: &Sway, camera: &Camera) -> Self {
         let foot = (f64::from(sway.foot) - camera.eye.y) as f32;
         Self { lean: sway.lean.to_array(), foot, ..self }
+    }
+
+    /// Of a crown whose shares of the light are known, seen from `to_eye`.
+    pub(crate) fn with_crown(self, crown: &CrownLight, light: &Light, to_eye: DVec3) -> Self {
+        let sunlit = match light {
+            Light::Sun(sun) => crown.sunlit(sun.to_sun, to_eye),
+            Light::Albedo => 1.0,
+        };
+        Self { crown: [sunlit, crown.sky], relit: 1, ..self }
     }
 
     /// Of points that bend with branches whose zero is `root` in the world.

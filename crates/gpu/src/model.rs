@@ -9,7 +9,7 @@ use crate::renderer::Renderer;
 use crate::views::ViewsModel;
 use crate::volume::VolumeModel;
 use forest_foliage::sway::USUAL_LIMBER;
-use forest_foliage::{FoliageBlock, Posed, Sway, Wind};
+use forest_foliage::{CrownLight, FoliageBlock, Posed, Sway, Wind};
 use forest_pack::measures::{Light, Measure, Measures};
 use forest_pack::{Pack, kind};
 use forest_points::PointsBlock;
@@ -27,6 +27,8 @@ pub struct Model<'p> {
     pub(crate) volume: Option<VolumeModel<'p>>,
     pub(crate) foliage: Option<FoliageModel<'p>>,
     measures: Option<Measures>,
+    /// What of the light its crown shows.
+    pub(crate) crown: Option<CrownLight>,
     stage: Stage,
     bounds: [DVec3; 2],
 }
@@ -52,7 +54,7 @@ impl<'p> Model<'p> {
         let points = there(PointsBlock::is_in(pack))
             .map(|()| PointsModel::load(gpu, &renderer.points, pack, foliage.as_ref()))
             .transpose()?;
-        let measures = Measures::read(pack)?;
+        let (measures, crown) = (Measures::read(pack)?, CrownLight::read(pack)?);
         gpu.finish()?;
         let (stage, bounds) = if let Some(p) = &points {
             let [min, max] = [p.block.header.min, p.block.header.max];
@@ -68,7 +70,7 @@ impl<'p> Model<'p> {
             let pack = pack.path().display().to_string();
             return Err(GpuError::Nothing { pack });
         };
-        Ok(Self { pack, points, views, volume, foliage, measures, stage, bounds })
+        Ok(Self { pack, points, views, volume, foliage, measures, crown, stage, bounds })
     }
 
     /// The pack.

@@ -125,6 +125,10 @@ impl Renderer {
         let sway = model.sway(&frame.wind, posed.as_ref());
         let mut uniform = FrameUniform::new(&samples, &frame.light, model.stage());
         uniform = uniform.with_sway(&sway, &samples);
+        if let Some(crown) = &model.crown {
+            let to_eye = frame.camera.to_eye(model.stage().middle);
+            uniform = uniform.with_crown(crown, &frame.light, to_eye);
+        }
         if let Some((foliage, posed)) = model.foliage.as_ref().zip(posed.as_ref()) {
             foliage.wind.prepare(gpu, posed);
             if model.points.as_ref().is_some_and(|p| p.is_tied) {

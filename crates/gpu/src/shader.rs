@@ -83,7 +83,7 @@ impl Shader {
             }
             Self::Foliage => &[COMMON, SURFACE, WIND, include_str!("wgsl/foliage.wgsl")],
             Self::Views => &[COMMON, LIT_BLOCK, TILE, include_str!("wgsl/views.wgsl")],
-            Self::Volume => &[COMMON, include_str!("wgsl/volume.wgsl")],
+            Self::Volume => &[COMMON, LIT_BLOCK, include_str!("wgsl/volume.wgsl")],
             Self::Present => &[include_str!("wgsl/present.wgsl")],
             Self::Landscape(step) => return [constants(), step.text()].concat(),
         };

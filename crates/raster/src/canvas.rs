@@ -23,6 +23,13 @@ pub struct Style {
     pub light: Light,
 }
 
+impl From<Sampling> for Style {
+    /// Base colours.
+    fn from(sampling: Sampling) -> Self {
+        Self { sampling, light: Light::Albedo }
+    }
+}
+
 impl Default for Style {
     /// 64 samples a pixel, base colours.
     fn default() -> Self {

@@ -57,6 +57,15 @@ impl Light {
         }
     }
 
+    /// Factors on the base colour of leaves that face all ways, seen along the unit vector `to_eye`, where a
+    /// share `sunlit` of the sun and `skylit` of the sky is seen: [`scattered`].
+    pub fn scattered(&self, to_eye: DVec3, sunlit: f32, skylit: f32) -> [f32; 3] {
+        match self {
+            Light::Albedo => [1.0; 3],
+            Light::Sun(sun) => sun.scattered(to_eye, sunlit, skylit),
+        }
+    }
+
     /// Factors on a base colour where only a share `sunlit` of the sun and `skylit` of the sky is seen.
     pub fn factors(&self, normal: Vec3, sunlit: f32, skylit: f32) -> [f32; 3] {
         match self {

@@ -66,6 +66,9 @@ pub const WIND_POINTS: u16 = 97;
 /// What moves each corner of the points' triangles, 12 bytes a triangle.
 pub const WIND_TRIANGLES: u16 = 98;
 
+/// What a crown shows of sun and sky, for representations without shadow maps.
+pub const LIGHT_CROWN: u16 = 112;
+
 /// Name of a kind for people; unknown kinds are named by number.
 pub fn name(kind: u16) -> String {
     match kind {
@@ -100,6 +103,7 @@ pub fn name(kind: u16) -> String {
         WIND_BRANCHES => "wind.branches".into(),
         WIND_POINTS => "wind.points".into(),
         WIND_TRIANGLES => "wind.triangles".into(),
+        LIGHT_CROWN => "light.crown".into(),
         other => format!("kind-{other}"),
     }
 }

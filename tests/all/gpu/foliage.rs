@@ -2,16 +2,20 @@
 //! share the samples.
 
 use super::{Device, SIDE, assert_same, cameras, thresholds, tree};
-use forest_draw::{FoliageScene, draw_bent_points, draw_points, read_surfaces};
-use forest_foliage::{BentPoints, FoliageBlock, FoliageOptions, PointsWind, Pose, Wind};
+use forest_draw::{
+    FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
+};
+use forest_foliage::{
+    BentPoints, CrownLight, FoliageBlock, FoliageOptions, PointsWind, Pose, Wind,
+};
 use forest_gpu::{Frame, Layer, Model, Options, What};
 use forest_points::{BakeOptions, PointsBlock, Thresholds};
 use forest_raster::{Light, Sampling, Style};
 use forest_soup::Camera;
 use forest_tests::pictures::rmse;
 use forest_tests::{bake_bytes, bake_foliage, bake_views, bake_volume, merged, open};
-use forest_views::{Directions, Dome, Lookup, ViewsOptions};
-use forest_volume::{Blending, Detail, Stand, VolumeOptions};
+use forest_views::{Channels, Directions, Dome, Lookup, ViewsBlock, ViewsOptions};
+use forest_volume::{Blending, Detail, Stand, VolumeBlock, VolumeOptions};
 
 /// Foliage, at rest and bent by the wind.
 #[test]
@@ -69,6 +73,63 @@ fn bent_points_are_those_of_draw() {
         let frame = Frame { camera: *camera, light: Light::MORNING, wind: gale, layers: &layers };
         let gpu = device.draw_frame(&mut model, &frame).0;
         assert_same(&format!("bent-points-{c}"), &gpu, &cpu);
+    }
+}
+
+/// Points, views with their own sky and without it, and volumes under what their crown shows of the light.
+#[test]
+fn the_light_on_a_crown_is_that_of_draw() {
+    let device = Device::new(Options::default());
+    let soup = tree("broadleaf_young.gltf");
+    let light = Light::MORNING;
+    for sky in [false, true] {
+        let views = ViewsOptions {
+            directions: Directions::octahedral(25, Dome::Upper),
+            texels: 64,
+            channels: Channels { normal: true, depth: true, sky },
+            ..ViewsOptions::default()
+        };
+        let volume = VolumeOptions { levels: 5, ..VolumeOptions::default() };
+        let bytes = merged(&[
+            bake_foliage(&soup, &FoliageOptions { levels: 1, ..Default::default() }).unwrap().0,
+            bake_bytes(&soup, &BakeOptions::default()).unwrap().0,
+            bake_views(&soup, &views).unwrap(),
+            bake_volume(&soup, Stand::Dome { cameras: 5 }, &volume, None).unwrap().0,
+        ]);
+        let pack = open(&bytes).unwrap();
+        let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
+        let points = PointsBlock::open(&pack).unwrap();
+        let surfaces = read_surfaces(&pack, &points).unwrap();
+        let views_block = ViewsBlock::open(&pack).unwrap();
+        let views = ViewsLevel::read(&views_block, 0).unwrap();
+        let volume_block = VolumeBlock::open(&pack).unwrap();
+        let volume = VolumeScene::read(&volume_block).unwrap();
+        let crown = CrownLight::read(&pack).unwrap().unwrap();
+        for (c, camera) in cameras(model.bounds())[..4].iter().enumerate() {
+            let to_eye = camera.to_eye(points.middle());
+            let style = |light| Style { sampling: Sampling::MIDDLE, light };
+            let lit = style(crown.light(light, to_eye));
+            let on_views = if sky { style(crown.sunlight(light, to_eye)) } else { lit };
+            let cut = thresholds(1.0, 16.0, 0.0);
+            let (detail, blending) = (Detail::Level(4), Blending::Shares);
+            for (what, cpu) in [
+                (What::Points(cut), draw_points(&points, surfaces.as_ref(), camera, &cut, &lit).0),
+                (What::Views(0, Lookup::Nearest), views.draw(camera, Lookup::Nearest, &on_views).0),
+                (What::Volume(detail, blending), volume.draw(camera, detail, blending, &lit).0),
+            ] {
+                let gpu = device.draw(&mut model, camera, light, &[Layer::whole(what)]);
+                assert_same(&format!("crown-{sky}-{c}-{}", name(&what)), &gpu, &cpu);
+            }
+        }
+    }
+}
+
+fn name(what: &What) -> &'static str {
+    match what {
+        What::Points(_) => "points",
+        What::Views(..) => "views",
+        What::Volume(..) => "volume",
+        What::Foliage(_) => "foliage",
     }
 }
 

@@ -175,7 +175,7 @@ fn volumes_are_the_same(name: &str, options: &VolumeOptions, codebook: Option<&C
     for (c, camera) in cameras(model.bounds()).iter().enumerate() {
         for (d, detail) in details.into_iter().enumerate() {
             for blending in [Blending::Shares, Blending::Over] {
-                let (cpu, cost) = scene.draw(camera, detail, blending, Sampling::MIDDLE);
+                let (cpu, cost) = scene.draw(camera, detail, blending, &Sampling::MIDDLE.into());
                 let layers = [Layer::whole(What::Volume(detail, blending))];
                 let (gpu, drawn) = device.draw_counted(&mut model, camera, Light::Albedo, &layers);
                 assert_eq!(drawn.cells, cost.cells);
@@ -224,7 +224,8 @@ fn samples_on_the_edges_of_cells_do_not_fall_through() {
         let alpha = |x: usize| (0..512).map(|y| f64::from(picture.pixels[y * 512 + x][3])).sum();
         (0..512).map(alpha).collect()
     };
-    let cpu = |camera| scene.draw(camera, Detail::PIXEL, Blending::Shares, Sampling::MIDDLE).0;
+    let style = Sampling::MIDDLE.into();
+    let cpu = |camera| scene.draw(camera, Detail::PIXEL, Blending::Shares, &style).0;
     let layers = [Layer::whole(What::Volume(Detail::PIXEL, Blending::Shares))];
     let gpu = device.draw(&mut model, &camera, Light::Albedo, &layers);
     // The crown's columns: none is emptier than both of its neighbours by much more than where samples

@@ -144,7 +144,7 @@ fn by_draw(pack: &Pack, camera: &Camera, what: What) -> Result<Picture> {
         }
         What::Volume(detail, blending) => {
             let block = VolumeBlock::open(pack)?;
-            VolumeScene::read(&block)?.draw(camera, detail, blending, Sampling::MIDDLE).0
+            VolumeScene::read(&block)?.draw(camera, detail, blending, &style).0
         }
     })
 }

@@ -32,7 +32,11 @@ struct Frame {
     // 1 if points bend with the branches of a block whose zero is at `root` from the eye.
     bends: u32,
     root: vec3f,
-    zero: f32,
+    // 1 if volumes are lit: they are base colours.
+    relit: u32,
+    // Shares of sun and sky that a crown shows: forest_foliage::CrownLight.
+    crown: vec2f,
+    zero: vec2f,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

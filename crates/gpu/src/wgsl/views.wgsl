@@ -359,6 +359,6 @@ fn fragment(@builtin(position) position: vec4f) -> Sample {
     }
     // On the side that is seen: views a few degrees off may see the other.
     let normal = select(hit.normal, -hit.normal, dot(hit.normal, ray.direction) > 0.0);
-    let rgb = hit.rgb * light(normal, sun_seen(place), hit.sky);
+    let rgb = hit.rgb * light(normal, sun_seen(place), select(frame.crown.y, hit.sky, sprite.has_sky != 0u));
     return Sample(vec4f(rgb, 1.0), depth_value(depth));
 }

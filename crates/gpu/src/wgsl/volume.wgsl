@@ -68,6 +68,8 @@ struct Billboard {
     @location(2) @interpolate(flat) faces: vec4u,
     // Pixels that a cell takes.
     @location(3) @interpolate(flat) cell: f32,
+    // Factors on its colour.
+    @location(4) @interpolate(flat) light: vec3f,
 }
 
 // The number of a node's billboard for a camera, or none.
@@ -149,6 +151,12 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
             reach = max(reach, box_of(shown) * out.cell + 0.01);
         }
     }
+    out.light = vec3f(1.0);
+    if frame.relit != 0u && frame.lit != 0u {
+        // The estimate is that of the tree at rest.
+        let direct = scattered(dot(to_eye(still), frame.to_sun), frame.translucency) * sun_seen(still);
+        out.light = frame.sun * direct + frame.sky * frame.crown.y;
+    }
     let corner = vec2f(f32(vertex & 1u), f32(vertex >> 1u)) * 2.0 - 1.0;
     out.position = flat_clip(at.xy + corner * reach, depth_value(at.z));
     return out;
@@ -213,5 +221,5 @@ fn fragment(in: Billboard) -> @location(0) vec4f {
         let alpha = 1.0 - pow(max(1.0 - color.a, LEAST_THROUGH), in.weight);
         color *= alpha / color.a;
     }
-    return color;
+    return color * vec4f(in.light, 1.0);
 }
