@@ -115,7 +115,9 @@ pub fn bake(
     let pictures = atlas(&panels, &layout);
     let lighting = start.elapsed();
     let start = Instant::now();
-    let crown_light = brighten(soup, &surfaces, &mut arrays, layout.size, &pictures[0]);
+    let translucency = translucency(soup, &leaves);
+    let dictionary = (layout.size, &pictures[0][..], translucency);
+    let crown_light = brighten(soup, &surfaces, &mut arrays, dictionary);
     let lighting = (lighting, start.elapsed());
     let start = Instant::now();
     let mut branches = [0; 4];
@@ -129,6 +131,7 @@ pub fn bake(
         source,
         branches,
         wind: wood.rig.records.len() as u32,
+        translucency,
         levels: arrays.iter().map(|a| a.header.clone()).collect(),
     };
     // What the reader would refuse is not written.
@@ -168,17 +171,26 @@ pub fn bake(
     })
 }
 
+/// Share of a light's translucency that leaves have in the mean over their area.
+fn translucency(soup: &TriangleSoup, leaves: &[Leaf]) -> f32 {
+    let of = |leaf: &Leaf| {
+        let material = soup.triangle_materials[leaf.triangles[0] as usize];
+        f64::from(soup.materials[usize::from(material)].translucency) * leaf.area
+    };
+    let area: f64 = leaves.iter().map(|l| l.area).sum();
+    if area > 0.0 { (leaves.iter().map(of).sum::<f64>() / area).min(1.0) as f32 } else { 1.0 }
+}
+
 /// Weighs the light on cards, so that each level is as bright as the source; the light on what has no shadow
 /// map.
 fn brighten(
     soup: &TriangleSoup,
     surfaces: &Surfaces,
     arrays: &mut [Arrays],
-    size: [u32; 2],
-    texels: &[[u8; 4]],
+    (size, texels, translucency): ([u32; 2], &[[u8; 4]], f32),
 ) -> CrownLight {
     let (mut materials, mut textures) = (soup.materials.clone(), soup.textures.clone());
-    materials.push(dictionary_material(textures.len() as u32));
+    materials.push(dictionary_material(textures.len() as u32, translucency));
     textures.push(Arc::new(dictionary_texture(size, texels.to_vec())));
     let own = Surfaces::new(&materials, &textures);
     let truth = Brightness::of(soup, surfaces);

@@ -130,7 +130,7 @@ impl<'a> FoliageBlock<'a> {
                 return Err(PackError::invalid(self.pack.path(), id, problem));
             }
         }
-        materials.push(dictionary_material(textures.len() as u32));
+        materials.push(dictionary_material(textures.len() as u32, self.header.translucency));
         textures.push(Arc::new(self.dictionary()?));
         Ok((materials, textures))
     }
@@ -218,14 +218,16 @@ pub(crate) fn level_soup(
     }
 }
 
-/// The material of what lies on cards and sheets; its texture is number `texture`.
-pub(crate) fn dictionary_material(texture: u32) -> Material {
+/// The material of what lies on cards and sheets; its texture is number `texture`, and it has this share of
+/// a light's translucency.
+pub(crate) fn dictionary_material(texture: u32, translucency: f32) -> Material {
     Material {
         name: "dictionary".into(),
         texture: Some(texture),
         // What covers a part of a texel covers a part of its samples.
         alpha_mode: AlphaMode::Blend,
         double_sided: true,
+        translucency,
         // Its pictures hold many leaves.
         scattered: true,
         ..Material::default()

@@ -10,7 +10,7 @@ use forest_raster::{
     Light, Picture, RayScene, Sampling, ShadowMap, Style, Sun, Surfaces, rasterize,
     rasterize_shadowed,
 };
-use forest_soup::{Camera, TriangleSoup, luminance};
+use forest_soup::{Camera, Material, TriangleSoup, luminance};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -89,9 +89,13 @@ impl Brightness {
         let truth = |(to_sun, camera): &(DVec3, Camera)| {
             styles(*to_sun).map(|style| mean(&rays.picture(camera, &style)))
         };
+        // What is lit by them has the light's own translucency.
+        let plain = |m: &Material| Material { translucency: 1.0, ..m.clone() };
+        let plain: Vec<Material> = soup.materials.iter().map(plain).collect();
+        let plain = Surfaces::new(&plain, &soup.textures);
         let crown = |i: u32| {
             let (to_sun, camera) = crown_setting(i, bounds);
-            let open = styles(to_sun).map(|s| mean(&rasterize(soup, surfaces, &camera, &s)));
+            let open = styles(to_sun).map(|s| mean(&rasterize(soup, &plain, &camera, &s)));
             let to_eye = camera.to_eye(0.5 * (bounds[0] + bounds[1]));
             Sample { to_sun, to_eye, truth: truth(&(to_sun, camera)), open }
         };

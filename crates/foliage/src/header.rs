@@ -25,6 +25,8 @@ pub struct FoliageHeader {
     pub branches: [u32; 4],
     /// Records of branches that wind moves.
     pub wind: u32,
+    /// Share of a light's translucency that leaves have in the mean, 0 … 1.
+    pub translucency: f32,
     /// Levels, finest first.
     pub levels: Vec<LevelHeader>,
 }

@@ -37,6 +37,9 @@ pub(crate) fn validate_header(h: &FoliageHeader) -> Result<(), String> {
     if !(1..=u32::from(u16::MAX)).contains(&h.wind) {
         return Err(format!("{} branches in the wind; from 1 to {}", h.wind, u16::MAX));
     }
+    if !(0.0..=1.0).contains(&h.translucency) {
+        return Err(format!("leaves have a translucency of {}; from 0 to 1", h.translucency));
+    }
     for (l, level) in h.levels.iter().enumerate() {
         let coarser = l == 0 || level.texel > h.levels[l - 1].texel;
         if !is_length(level.texel) || !coarser {

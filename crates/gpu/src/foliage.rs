@@ -37,7 +37,7 @@ struct FoliageUniform {
     windy: u32,
     sunlit: f32,
     turning: [f32; 3],
-    zero1: u32,
+    through: f32,
 }
 
 /// `SunView` of foliage.wgsl.
@@ -202,7 +202,7 @@ impl<'p> FoliageModel<'p> {
                 windy: posed.is_some().into(),
                 sunlit: self.block.header.levels[level].sunlit,
                 turning: from_eye(camera.eye),
-                zero1: 0,
+                through: self.block.header.translucency,
             };
             if let Some(sun) = &sun {
                 let own = FoliageUniform { origin: from_eye(sun.eye), fade: [0.0, 1.0], ..uniform };

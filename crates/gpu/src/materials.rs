@@ -19,7 +19,7 @@ struct MaterialRecord {
     uv_step: [f32; 2],
     rule: u32,
     cutoff: f32,
-    /// Bit 0: unlit. Bit 1: its triangles have vertex colours.
+    /// Bit 0: unlit. Bit 1: its triangles have vertex colours. From bit 8: translucency in steps.
     flags: u32,
     image: u32,
 }
@@ -34,6 +34,9 @@ struct ImageRecord {
     size: [u32; 2],
     wrap: [u32; 2],
 }
+
+/// Steps of a material's translucency.
+pub(crate) const TRANSLUCENCY_STEPS: f64 = 65535.0;
 
 /// The tables of surface.wgsl.
 #[derive(Debug)]
@@ -83,7 +86,8 @@ fn material_record(m: &Material, range: &UvRange, colors: bool) -> MaterialRecor
         AlphaMode::Blend => (2, 0.0),
     };
     let image = m.texture.unwrap_or(u32::MAX);
-    let flags = u32::from(m.unlit) | u32::from(colors) << 1;
+    let through = (f64::from(m.translucency) * TRANSLUCENCY_STEPS).round() as u32;
+    let flags = u32::from(m.unlit) | u32::from(colors) << 1 | through << 8;
     let (uv_min, uv_step) = (range.min, range.step);
     MaterialRecord { base: m.base_color, uv_min, uv_step, rule, cutoff, flags, image }
 }

@@ -175,6 +175,7 @@ fn constants() -> String {
         ("MOST_LEAN", forest_foliage::sway::MOST_LEAN.into()),
         ("GUST", landscape::GUST),
         ("OWN_PHASE", landscape::OWN_PHASE),
+        ("TRANSLUCENCY_STEPS", crate::materials::TRANSLUCENCY_STEPS),
         ("BUCKETS_PER_OCTAVE", f64::from(landscape::BUCKETS_PER_OCTAVE)),
         ("IMPOSTOR_FADE", forest_scene::IMPOSTOR_FADE),
         ("LEAST_IMPOSTOR", forest_scene::LEAST_IMPOSTOR),

@@ -51,6 +51,12 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
         if m.texture.is_some_and(|t| t as usize >= count) {
             return Err(invalid(format!("material {i} uses texture {:?} of {count}", m.texture)));
         }
+        if !(0.0..=1.0).contains(&m.translucency) {
+            let share = m.translucency;
+            return Err(invalid(format!(
+                "material {i} has a translucency of {share}; from 0 to 1"
+            )));
+        }
         let alpha_mode = match m.alpha_mode {
             0 => AlphaMode::Opaque,
             1 => AlphaMode::Mask { cutoff: m.alpha_cutoff },
@@ -66,6 +72,7 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
             alpha_mode,
             double_sided: m.double_sided,
             unlit: m.unlit,
+            translucency: m.translucency,
             scattered: false,
         });
     }
@@ -119,6 +126,7 @@ fn material_header(m: &Material) -> MaterialHeader {
         alpha_cutoff,
         double_sided: m.double_sided,
         unlit: m.unlit,
+        translucency: m.translucency,
     }
 }
 

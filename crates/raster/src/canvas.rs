@@ -251,6 +251,7 @@ impl Canvas<'_> {
         if let (Some(map), true) = (&self.list.shadow, f.shadowed) {
             sunlit *= map.seen(place());
         }
+        let sun = sun.through(f.translucency);
         let factors = match f.scattered {
             true => sun.scattered(self.camera.to_eye(place()), sunlit, f.sky),
             false => sun.factors(f.normal, sunlit, f.sky),

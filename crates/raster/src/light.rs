@@ -95,6 +95,11 @@ impl Sun {
         std::array::from_fn(|k| self.sun[k] * direct + self.sky[k] * skylit)
     }
 
+    /// The light on a surface that has this share of its translucency.
+    pub(crate) fn through(&self, share: f32) -> Self {
+        Self { translucency: self.translucency * share, ..*self }
+    }
+
     /// Factors on the base colour where `sunlit` of the sun and `skylit` of the sky is seen.
     pub(crate) fn factors(&self, normal: Vec3, sunlit: f32, skylit: f32) -> [f32; 3] {
         let cos = normal.dot(self.to_sun.as_vec3());

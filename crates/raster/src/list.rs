@@ -215,6 +215,8 @@ pub(crate) struct Fragment {
     pub(crate) unlit: bool,
     /// It faces all ways.
     pub(crate) scattered: bool,
+    /// Share of the light's translucency.
+    pub(crate) translucency: f32,
     /// Shadow maps shade it.
     pub(crate) shadowed: bool,
     /// Share of the sun that is seen from there.
@@ -227,7 +229,8 @@ impl Fragment {
     /// A colour as it is.
     pub(crate) fn unlit(rgb: [f32; 3]) -> Self {
         let (unlit, scattered, shadowed) = (true, false, false);
-        Self { rgb, normal: Vec3::ZERO, unlit, scattered, shadowed, sunlit: 1.0, sky: 1.0 }
+        let [translucency, sunlit, sky] = [1.0; 3];
+        Self { rgb, normal: Vec3::ZERO, unlit, scattered, translucency, shadowed, sunlit, sky }
     }
 }
 
@@ -314,6 +317,7 @@ impl<'a> Triangle<'a> {
             normal: (a * w[0] + b * w[1] + c * w[2]).normalize_or_zero(),
             unlit: self.surface.is_unlit(),
             scattered: self.surface.is_scattered(),
+            translucency: self.surface.translucency(),
             shadowed: true,
             sunlit: self.sunlit[0] * w[0] + self.sunlit[1] * w[1] + self.sunlit[2] * w[2],
             sky: self.skylit[0] * w[0] + self.skylit[1] * w[1] + self.skylit[2] * w[2],

@@ -158,7 +158,8 @@ impl<'a> RayScene<'a> {
         let surface = self.surfaces.get(material)?;
         let rgb = surface.at(uv, tint).0;
         let (own, normal) = self.normals(hit.i, hit.at, direction);
-        Some(Seen { rgb, unlit: surface.is_unlit(), own, normal })
+        let (unlit, translucency) = (surface.is_unlit(), surface.translucency());
+        Some(Seen { rgb, unlit, translucency, own, normal })
     }
 
     /// Where the ray meets triangle `i`, if the triangle covers there for sample `grid`.

@@ -48,6 +48,11 @@ impl Surface {
         self.material.scattered
     }
 
+    /// Share of a light's translucency.
+    pub(crate) fn translucency(&self) -> f32 {
+        self.material.translucency
+    }
+
     pub(crate) fn is_unlit(&self) -> bool {
         self.material.unlit
     }

@@ -170,6 +170,8 @@ pub(crate) struct Seen {
     pub(crate) rgb: [f32; 3],
     /// Whether it shines by itself.
     pub(crate) unlit: bool,
+    /// Share of the light's translucency.
+    pub(crate) translucency: f32,
     /// The triangle's own normal, towards the eye.
     pub(crate) own: Vec3,
     /// The interpolated one, turned over if the triangle's own is.
@@ -190,6 +192,7 @@ impl Seen {
         if self.unlit {
             return self.rgb;
         }
+        let sun = sun.through(self.translucency);
         let to_sun = sun.to_sun.as_vec3();
         let cos = self.normal.dot(to_sun);
         // Light on the far side starts from there.

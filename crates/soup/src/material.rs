@@ -31,6 +31,9 @@ pub struct Material {
     pub double_sided: bool,
     /// The colour is emitted as it is, without lighting.
     pub unlit: bool,
+    /// Share of a light's translucency that this surface has, `0..=1`: light on its far side shines through
+    /// as much of it as that.
+    pub translucency: f32,
     /// A surface stands for many leaves that face all ways: it is lit by their mean, not by its normal.
     pub scattered: bool,
 }
@@ -45,6 +48,7 @@ impl Default for Material {
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,
+            translucency: 1.0,
             scattered: false,
         }
     }

@@ -7,7 +7,8 @@
 //! outside a file's own folder is read unless [`Limits::allow_outside`] says so.
 //!
 //! Sources: the glTF 2.0 specification and the extensions KHR_texture_transform,
-//! KHR_materials_unlit, KHR_materials_pbrSpecularGlossiness (base colour), KHR_mesh_quantization,
+//! KHR_materials_unlit, KHR_materials_diffuse_transmission (its factor),
+//! KHR_materials_pbrSpecularGlossiness (base colour), KHR_mesh_quantization,
 //! EXT_mesh_gpu_instancing, EXT_meshopt_compression, EXT_texture_webp; the Wavefront OBJ and MTL
 //! notes of P. Bourke.
 //!

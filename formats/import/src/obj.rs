@@ -265,6 +265,7 @@ impl Pictures {
             alpha_mode: if translucent { AlphaMode::Blend } else { AlphaMode::Opaque },
             double_sided: true,
             unlit: m.illumination_model == Some(0),
+            translucency: Material::default().translucency,
             scattered: false,
         };
         Ok((material, options))

@@ -95,6 +95,8 @@ pub struct MaterialHeader {
     pub double_sided: bool,
     /// The colour is shown without lighting.
     pub unlit: bool,
+    /// Share of a light's translucency that the surface has, 0 … 1.
+    pub translucency: f32,
 }
 
 /// One texture's size and wrap modes.

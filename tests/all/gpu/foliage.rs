@@ -21,8 +21,11 @@ use forest_volume::{Blending, Detail, Stand, VolumeBlock, VolumeOptions};
 #[test]
 fn foliage_is_drawn_as_the_cpu_draws_it() {
     let device = Device::new(Options::default());
-    let soup = tree("broadleaf_young.gltf");
+    let mut soup = tree("broadleaf_young.gltf");
     for blocks in [true, false] {
+        // And leaves and wood that let less light through than the light says.
+        let share = if blocks { 1.0 } else { 0.3 };
+        soup.materials.iter_mut().for_each(|m| m.translucency = share);
         let options = FoliageOptions { blocks, ..FoliageOptions::default() };
         let pack = open(&bake_foliage(&soup, &options).unwrap().0).unwrap();
         let mut model = Model::load(&device.gpu, &device.renderer, &pack).unwrap();
@@ -47,7 +50,8 @@ fn foliage_is_drawn_as_the_cpu_draws_it() {
 #[test]
 fn bent_points_are_those_of_draw() {
     let device = Device::new(Options::default());
-    let soup = tree("broadleaf_young.gltf");
+    let mut soup = tree("broadleaf_young.gltf");
+    soup.materials.iter_mut().for_each(|m| m.translucency = 0.3);
     let pack = open(&merged(&[
         bake_foliage(&soup, &FoliageOptions::default()).unwrap().0,
         bake_bytes(&soup, &BakeOptions::default()).unwrap().0,
@@ -61,10 +65,12 @@ fn bent_points_are_those_of_draw() {
     let gale = Wind { strength: 1.0, time: 2.2, ..Wind::default() };
     let pose = Pose::new(foliage.branches, &gale, 0.0);
     let bent = BentPoints::new(&foliage, &wind, &pose);
-    let style = Style { sampling: Sampling::MIDDLE, light: Light::MORNING };
+    let crown = CrownLight::read(&pack).unwrap().unwrap();
     let cuts = [thresholds(1.0, 16.0, 0.0), Thresholds::TRIANGLES, thresholds(900.0, 1e9, 0.0)];
     for (c, camera) in cameras(model.bounds()).iter().enumerate() {
         let cut = &cuts[c % 3];
+        let light = crown.light(Light::MORNING, camera.to_eye(block.middle()));
+        let style = Style { sampling: Sampling::MIDDLE, light };
         let surfaces = surfaces.as_ref();
         let (cpu, _) = draw_bent_points(&block, surfaces, camera, cut, &style, &bent);
         let (still, _) = draw_points(&block, surfaces, camera, cut, &style);

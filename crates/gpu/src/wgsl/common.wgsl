@@ -131,11 +131,16 @@ fn srgb_to_linear(c: vec3f) -> vec3f {
 
 // Factors on a base colour: forest_raster::Sun. The normal faces the eye.
 fn light(normal: vec3f, sunlit: f32, skylit: f32) -> vec3f {
+    return light_through(1.0, normal, sunlit, skylit);
+}
+
+// The same on a surface that has a share `through` of the light's translucency.
+fn light_through(through: f32, normal: vec3f, sunlit: f32, skylit: f32) -> vec3f {
     if frame.lit == 0u {
         return vec3f(1.0);
     }
     let c = dot(normal, frame.to_sun);
-    let direct = (max(c, 0.0) + frame.translucency * max(-c, 0.0)) * sunlit;
+    let direct = (max(c, 0.0) + through * frame.translucency * max(-c, 0.0)) * sunlit;
     return frame.sun * direct + frame.sky * skylit;
 }
 

@@ -19,7 +19,8 @@ struct Foliage {
     sunlit: f32,
     // Of the zero of vertices, from the eye that leaves turn about: in a shadow map the picture's.
     turning: vec3f,
-    zero1: u32,
+    // Share of the light's translucency that cards have.
+    through: f32,
 }
 
 // The parallel camera of a shadow map.
@@ -147,14 +148,16 @@ fn shadow_at(place: vec3f) -> f32 {
 struct Surface {
     color: vec4f,
     unlit: bool,
+    // Share of the light's translucency.
+    through: f32,
 }
 
 fn surface_of(in: Corner) -> Surface {
     if in.what.y == DICTIONARY {
-        return Surface(dictionary_at(in.uv) * in.tint, false);
+        return Surface(dictionary_at(in.uv) * in.tint, false, foliage.through);
     }
     let m = materials[in.what.y];
-    return Surface(surface_at(m, in.uv, in.tint), (m.flags & 1u) != 0u);
+    return Surface(surface_at(m, in.uv, in.tint), (m.flags & 1u) != 0u, translucency_of(m));
 }
 
 fn is_covered_by(in: Corner, alpha: f32) -> bool {
@@ -185,9 +188,9 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
     let sunlit = shadow_at(in.place);
     if in.what.y == DICTIONARY {
         // Cards show many leaves, which face all ways.
-        let direct = scattered(dot(to_eye(in.place), frame.to_sun), frame.translucency);
+        let direct = scattered(dot(to_eye(in.place), frame.to_sun), surface.through * frame.translucency);
         return vec4f(rgb * (frame.sun * (direct * foliage.sunlit * sunlit) + frame.sky * in.skylit), 1.0);
     }
     let normal = normalize(select(-in.normal, in.normal, front));
-    return vec4f(rgb * light(normal, sunlit, in.skylit), 1.0);
+    return vec4f(rgb * light_through(surface.through, normal, sunlit, in.skylit), 1.0);
 }

@@ -7,10 +7,15 @@ struct Material {
     // 0 opaque, 1 mask, 2 blend.
     rule: u32,
     cutoff: f32,
-    // Bit 0: unlit. Bit 1: its triangles have vertex colours.
+    // Bit 0: unlit. Bit 1: its triangles have vertex colours. From bit 8: see `translucency_of`.
     flags: u32,
     // Number of the texture; all ones for none.
     image: u32,
+}
+
+// Share of the light's translucency.
+fn translucency_of(m: Material) -> f32 {
+    return f32(m.flags >> 8u) / TRANSLUCENCY_STEPS;
 }
 
 struct Image {

@@ -73,5 +73,5 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
         return vec4f(seen.rgb, 1.0);
     }
     let normal = normalize(select(-in.normal, in.normal, front));
-    return vec4f(seen.rgb * light(normal, in.seen.x, in.seen.y * skyward(normal)), 1.0);
+    return vec4f(seen.rgb * light_through(translucency_of(m), normal, in.seen.x, in.seen.y * skyward(normal)), 1.0);
 }

@@ -33,6 +33,26 @@ fn lit(to_sun: DVec3, sun: f32, sky: f32, translucency: f32) -> Style {
     Style { light: Light::Sun(sun), sampling: Sampling::TRUTH }
 }
 
+/// A leaf under the sun, seen from above and from below, by rays and by scanlines.
+#[test]
+fn light_shines_through_as_light_and_material_let_it() {
+    let mut leaf = soup(&square(0.0, 4.0));
+    for (of_light, of_leaf) in [(1.0, 1.0), (0.5, 1.0), (1.0, 0.25), (0.5, 0.5), (0.0, 1.0)] {
+        leaf.materials[0].translucency = of_leaf;
+        let surfaces = Surfaces::new(&leaf.materials, &[]);
+        let style = lit(DVec3::Y, 1.0, 0.0, of_light);
+        for (up, want) in [(1.0, 1.0), (-1.0, of_light * of_leaf)] {
+            let projection = Projection::Orthographic { height: 1.0 };
+            let camera = Camera::new(DVec3::Y * up, DVec3::NEG_Y * up, projection, [4, 4]);
+            let rays = RayScene::new(&leaf, &surfaces).picture(&camera, &style);
+            for picture in [rays, rasterize(&leaf, &surfaces, &camera, &style)] {
+                let seen = picture.pixels[5][0];
+                assert!((seen - want).abs() < 1e-5, "{of_light} {of_leaf} {up}: {seen}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_roof_throws_its_shadow_and_hides_the_sky() {
     // A floor, and above it a small roof that is out of the picture.

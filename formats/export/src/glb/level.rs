@@ -150,8 +150,7 @@ impl<'a> Levels<'a> {
         let material = Material {
             name: name.into(),
             alpha_mode: AlphaMode::Mask { cutoff },
-            double_sided: true,
-            ..Material::default()
+            ..self.materials.last().cloned().unwrap_or_default()
         };
         Ok(out.material(&material, Some(texture)))
     }

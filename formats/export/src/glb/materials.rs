@@ -6,6 +6,7 @@ use crate::picture::{check_size, png};
 use forest_soup::{AlphaMode, Material, Texture, Wrap};
 use image::{DynamicImage, RgbImage, RgbaImage};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 
 /// Materials, textures, images and samplers of a document.
 #[derive(Default)]
@@ -14,8 +15,8 @@ pub(crate) struct Materials {
     pub(crate) textures: Vec<Value>,
     pub(crate) images: Vec<Value>,
     pub(crate) samplers: Vec<Value>,
-    /// A material is shown as it is.
-    pub(crate) unlit: bool,
+    /// Extensions of materials.
+    pub(crate) used: BTreeSet<&'static str>,
 }
 
 impl Materials {
@@ -80,7 +81,20 @@ impl Materials {
         }
         if material.unlit {
             value["extensions"] = json!({ "KHR_materials_unlit": {} });
-            self.unlit = true;
+            self.used.insert("KHR_materials_unlit");
+        } else if material.translucency < 1.0 {
+            // As it is imported; what is not told of translucency stays untold.
+            let share = material.translucency / (1.0 + material.translucency);
+            let [r, g, b, _] = material.base_color.map(f64::from);
+            let mut own = json!({
+                "diffuseTransmissionFactor": f64::from(share),
+                "diffuseTransmissionColorFactor": [r, g, b],
+            });
+            if let Some(texture) = texture {
+                own["diffuseTransmissionColorTexture"] = json!({ "index": texture });
+            }
+            value["extensions"] = json!({ "KHR_materials_diffuse_transmission": own });
+            self.used.insert("KHR_materials_diffuse_transmission");
         }
         self.materials.push(value);
         self.materials.len() - 1

@@ -83,15 +83,12 @@ pub fn levels(
         "byteStride": size_of::<BranchRecord>(),
         "origin": (foliage.origin() - place).to_array().to_vec(),
     });
-    let mut used = vec![];
+    let mut used = materials.used;
     if texels.len() > 1 {
         first["extensions"] =
             json!({ "MSFT_lod": { "ids": (1..texels.len()).collect::<Vec<_>>() } });
         first["extras"]["MSFT_screencoverage"] = coverages(&texels, 0.5 * min.distance(max)).into();
-        used.push("MSFT_lod");
-    }
-    if materials.unlit {
-        used.push("KHR_materials_unlit");
+        used.insert("MSFT_lod");
     }
     let mut document = json!({
         "asset": {

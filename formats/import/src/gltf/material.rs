@@ -174,6 +174,25 @@ fn look(info: &Info) -> Look {
     }
 }
 
+/// KHR_materials_diffuse_transmission, by its factors: of light on the far side the share f shines through, of
+/// light on the near one 1 − f comes back. A surface is said here to give back all of its colour, and f over
+/// 1 − f of it from behind, at most all. Materials without the extension, and those of files without it, let
+/// light through as the light says.
+fn translucency(source: &Source, m: &gltf::json::Material, i: usize) -> Result<f32, ImportError> {
+    let others = m.extensions.as_ref().map(|e| &e.others);
+    let Some(own) = others.and_then(|o| o.get("KHR_materials_diffuse_transmission")) else {
+        return Ok(Material::default().translucency);
+    };
+    let share = own.get("diffuseTransmissionFactor").map_or(Some(0.0), Value::as_f64);
+    match share.filter(|s| (0.0..=1.0).contains(s)) {
+        Some(share) => Ok((share / (1.0 - share)).min(1.0) as f32),
+        None => {
+            let problem = format!("diffuseTransmissionFactor {own}; it must be within 0 and 1");
+            Err(source.invalid(format!("material {i}"), problem))
+        }
+    }
+}
+
 /// Material `i` and how its texture is laid on.
 pub(crate) fn material(
     source: &Source,
@@ -207,6 +226,7 @@ pub(crate) fn material(
         unlit: extensions.is_some_and(|e| {
             e.unlit.is_some() || e.others.get("KHR_materials_unlit").is_some_and(Value::is_object)
         }),
+        translucency: translucency(source, m, i)?,
         scattered: false,
     };
     Ok((material, base.texture.map(|t| t.look)))

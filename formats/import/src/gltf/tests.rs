@@ -172,6 +172,27 @@ fn vertex_colours_materials_and_alpha_modes() {
     assert!(m.double_sided && m.unlit);
     assert_eq!(m.base_color, [0.5, 0.25, 1.0, 0.75]);
     assert_eq!(model.meshes[0].colors[0], [1.0, 0.0, 128.0 / 255.0, 0.2]);
+    assert_eq!(m.translucency, 1.0);
+}
+
+#[test]
+fn diffuse_transmission_becomes_translucency() {
+    for (own, want) in [
+        (json!({}), Some(0.0)),
+        (json!({ "diffuseTransmissionFactor": 0.2 }), Some(0.25)),
+        (json!({ "diffuseTransmissionFactor": 0.9 }), Some(1.0)),
+        (json!({ "diffuseTransmissionFactor": 1.5 }), None),
+        (json!({ "diffuseTransmissionFactor": "much" }), None),
+    ] {
+        let mut doc = Doc::triangle();
+        doc.primitive()["material"] = json!(0);
+        let extensions = json!({ "KHR_materials_diffuse_transmission": own });
+        doc.json["materials"] = json!([{ "extensions": extensions }]);
+        match want {
+            Some(want) => assert_eq!(doc.load().unwrap().materials[0].translucency, want),
+            None => _ = doc.refused(&["material 0", "diffuseTransmissionFactor", "within 0 and 1"]),
+        }
+    }
 }
 
 #[test]
