@@ -6,6 +6,7 @@
 #   make bench    measure bakes; writes docs/BENCH.md and docs/LEVELS.txt
 #   make report   evaluate the trees; writes docs/REPORT.md, the README's figures, out/report/*.html
 #   make views    measure views; writes docs/VIEWS.md and docs/views.svg
+#   make foliage  measure levels of foliage beside simplified meshes; writes docs/FOLIAGE.md, docs/foliage.png
 #   make light    measure what each factor of the light on leaves buys; writes docs/LIGHT.md
 #   make volume   measure volumes; writes docs/VOLUME.md, docs/volume.svg, docs/volume_heldout.png
 #   make view     measure the viewer; writes docs/VIEWER.md and the README's pictures of it
@@ -24,7 +25,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+.PHONY: foliage light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
 
 # Installs what variable `missing` of a recipe's shell names, or says what to install.
 INSTALL = if [ -n "$$missing" ]; then \
@@ -135,6 +136,10 @@ report: setup
 views: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/views
+
+foliage: setup
+	$(CARGO) build --release -p forest-tests --bin foliage
+	target/release/foliage
 
 light: setup
 	$(CARGO) build --release -p forest-tests --bin light

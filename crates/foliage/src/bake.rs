@@ -2,6 +2,7 @@
 
 use crate::block::{dictionary_material, dictionary_texture, level_soup};
 use crate::branch::OnBranch;
+use crate::cover::cover;
 use crate::crown::CrownLight;
 use crate::dictionary::{Layout, MOST_SIDE, atlas, encode};
 use crate::error::FoliageError;
@@ -117,7 +118,7 @@ pub fn bake(
     let start = Instant::now();
     let translucency = translucency(soup, &leaves);
     let dictionary = (layout.size, &pictures[0][..], translucency);
-    let crown_light = brighten(soup, &surfaces, &mut arrays, dictionary);
+    let crown_light = brighten(soup, &surfaces, &mut arrays, dictionary, pivot_step);
     let lighting = (lighting, start.elapsed());
     let start = Instant::now();
     let mut branches = [0; 4];
@@ -181,13 +182,14 @@ fn translucency(soup: &TriangleSoup, leaves: &[Leaf]) -> f32 {
     if area > 0.0 { (leaves.iter().map(of).sum::<f64>() / area).min(1.0) as f32 } else { 1.0 }
 }
 
-/// Weighs the light on cards, so that each level is as bright as the source; the light on what has no shadow
-/// map.
+/// Sizes cards and weighs the light on them, so that each level covers what the source covers and is as bright;
+/// the light on what has no shadow map.
 fn brighten(
     soup: &TriangleSoup,
     surfaces: &Surfaces,
     arrays: &mut [Arrays],
     (size, texels, translucency): ([u32; 2], &[[u8; 4]], f32),
+    pivot_step: f64,
 ) -> CrownLight {
     let (mut materials, mut textures) = (soup.materials.clone(), soup.textures.clone());
     materials.push(dictionary_material(textures.len() as u32, translucency));
@@ -197,6 +199,8 @@ fn brighten(
     for Arrays { header, vertices, indices } in arrays {
         let mut level = level_soup(header, vertices, indices, &materials, &textures);
         level.origin = soup.origin;
+        let first = header.wood_vertices as usize;
+        cover(&truth, &mut level, &own, vertices, first, pivot_step);
         let [sun, sky] = truth.weights(&mut level, &own);
         header.sunlit = sun as f32;
         for v in &mut vertices[header.wood_vertices as usize..] {

@@ -27,11 +27,16 @@ const WEIGHTS: std::ops::RangeInclusive<f64> = 0.25..=1.5;
 /// Suns by which the light on crowns is fitted, all around the eye.
 const CROWN_SUNS: u32 = 14;
 
+/// Views by which the size of cards is fitted.
+const COVER_VIEWS: u32 = 8;
+
 /// The truth: light of pictures under each sun, and under the sky.
 pub(crate) struct Brightness {
     bounds: [DVec3; 2],
     /// In sunlight, and in skylight.
     light: Vec<[f64; 2]>,
+    /// Of all pictures together, in pixels.
+    coverage: f64,
     crown: Vec<Sample>,
 }
 
@@ -76,6 +81,21 @@ fn styles(to_sun: DVec3) -> [Style; 2] {
     })
 }
 
+/// Views from which coverage is measured: as many from everywhere above the horizon.
+fn cover_views(bounds: [DVec3; 2]) -> impl Iterator<Item = Camera> {
+    (0..COVER_VIEWS).map(move |i| {
+        let pitch = ((f64::from(i) + 0.5) / f64::from(COVER_VIEWS)).asin().to_degrees();
+        Camera::around(bounds, [f64::from(i) * 137.5, pitch], None, [SIDE; 2])
+    })
+}
+
+/// Pixels that a soup covers.
+fn covered(soup: &TriangleSoup, surfaces: &Surfaces, camera: &Camera) -> f64 {
+    let sampling = Sampling { side: SAMPLES, seed: 1 };
+    let picture = rasterize(soup, surfaces, camera, &sampling.into());
+    picture.pixels.iter().map(|p| f64::from(p[3])).sum()
+}
+
 fn mean(picture: &Picture) -> f64 {
     picture.pixels.iter().map(|p| f64::from(luminance([p[0], p[1], p[2]]))).sum()
 }
@@ -99,11 +119,20 @@ impl Brightness {
             let to_eye = camera.to_eye(0.5 * (bounds[0] + bounds[1]));
             Sample { to_sun, to_eye, truth: truth(&(to_sun, camera)), open }
         };
+        let views = cover_views(bounds);
+        let coverage = views.map(|camera| covered(soup, surfaces, &camera)).sum();
         Self {
             bounds,
+            coverage,
             light: (0..SUNS).map(|i| truth(&setting(i, bounds))).collect(),
             crown: (0..CROWN_SUNS).map(crown).collect(),
         }
+    }
+
+    /// Coverage of the truth over that of `level`.
+    pub(crate) fn coverage_over(&self, level: &TriangleSoup, surfaces: &Surfaces) -> f64 {
+        let views = cover_views(self.bounds);
+        self.coverage / views.map(|camera| covered(level, surfaces, &camera)).sum::<f64>()
     }
 
     /// The light on representations without shadow maps.

@@ -39,6 +39,7 @@
 mod bake;
 mod block;
 mod branch;
+mod cover;
 mod crown;
 mod dictionary;
 mod error;

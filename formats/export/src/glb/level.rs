@@ -57,6 +57,9 @@ impl<'a> Levels<'a> {
                 "material": material,
             }));
         }
+        if primitives.is_empty() {
+            return Err(ExportError::Unsuited(format!("{name}: the level shows nothing")));
+        }
         Ok(json!({ "name": name, "primitives": primitives }))
     }
 
