@@ -4,6 +4,7 @@ use crate::failure::Usage;
 use crate::output;
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
+use forest_foliage::FoliageBlock;
 use forest_pack::{Pack, PackWriter, kind};
 use forest_points::{PixelArea, PointsBlock, PointsNeed, PruneReport, Thresholds, prune};
 use forest_scene::{
@@ -243,9 +244,10 @@ fn write(
         }
     }
     let of_scene = args.nearest.is_none();
+    let keeps_foliage = !of_scene && FoliageBlock::is_in(pack);
     let rest = |kind: u16| match kind {
-        // Foliage is drawn with them, even where no triangle is left.
-        kind::MATERIALS | kind::TEXTURE => !of_scene && kept.triangles[1] == 0,
+        // Foliage is drawn with them, even where no triangle of the points is left.
+        kind::MATERIALS | kind::TEXTURE => keeps_foliage && kept.triangles[1] == 0,
         kind::POINTS_HEADER..kind::VOLUME_HEADER | kind::WIND_POINTS | kind::WIND_TRIANGLES => {
             false
         }
