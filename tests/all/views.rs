@@ -453,6 +453,25 @@ fn the_coarsest_levels_keep_their_coverage_when_drawn() {
     }
 }
 
+/// Along a baked direction one view has all shares; what a perspective camera's rays pass behind in it, the
+/// others show.
+#[test]
+fn depth_from_a_baked_direction_has_no_holes() {
+    let soup = leaves(1500, 0.08, 11);
+    let pack = open(&bake_views(&soup, &options(81, 64)).unwrap()).unwrap();
+    let block = ViewsBlock::open(&pack).unwrap();
+    let views = ViewsLevel::read(&block, 0).unwrap();
+    let surfaces = Surfaces::new(&soup.materials, &soup.textures);
+    for view in [0, 12, 40, 61] {
+        let from = block.directions().direction(view);
+        let eye = block.center() + from * (3.0 * block.header.radius);
+        let camera = Camera::new(eye, -from, Projection::Perspective { fov_y: 0.8 }, [96; 2]);
+        let got = views.draw(&camera, Lookup::Depth, &Style::default()).0.mean_coverage();
+        let want = rasterize(&soup, &surfaces, &camera, &Style::default()).mean_coverage();
+        assert!((got / want - 1.0).abs() < 0.03, "view {view}: {got} of {want}");
+    }
+}
+
 #[test]
 fn what_exceeds_a_page_goes_to_another() {
     let soup = leaves(300, 0.3, 5);

@@ -60,14 +60,20 @@ pub fn select(block: &ViewsBlock, camera: &Camera, lookup: Lookup, texel: f64) -
     Selection { level, views: views(block, camera, lookup) }
 }
 
-/// The views that `lookup` takes for `camera`, and their shares.
+/// The views that `lookup` takes for `camera`, and their shares; those without any are not looked at.
 pub fn views(block: &ViewsBlock, camera: &Camera, lookup: Lookup) -> Blend {
     let from = camera.to_eye(block.center());
     match lookup {
         Lookup::Nearest => [(block.directions().nearest(from), 1.0), (0, 0.0), (0, 0.0)],
-        Lookup::Blend | Lookup::Depth => block.directions().blend(from),
+        Lookup::Blend => block.directions().blend(from),
+        // Those without a share are still asked for what the others do not see: along a baked direction one
+        // view has all of it, and rays of a perspective camera pass behind what it sees.
+        Lookup::Depth => block.directions().blend(from).map(|(v, s)| (v, s.max(ASKED_LAST))),
     }
 }
+
+/// Share of a view that is asked last.
+const ASKED_LAST: f32 = 1e-6;
 
 impl ViewsBlock<'_> {
     /// Stored bytes of a view's tile in the channels that `lookup` reads; base colours need no light.
