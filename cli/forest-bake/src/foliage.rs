@@ -6,6 +6,7 @@ use crate::target;
 use anyhow::Result;
 use forest_foliage::{BakeReport, FoliageOptions, PartsOptions, WoodWay, bake};
 use forest_pack::{PackWriter, SectionId, header, kind};
+use glam::DVec3;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -86,6 +87,9 @@ struct Summary {
     leaves: usize,
     /// Finest first.
     levels: Vec<LevelSummary>,
+    /// Shares of the sun that the other representations of the pack show, the sun behind the eye and
+    /// against it, 45° high; and of the sky.
+    light: [f32; 3],
     /// Texels across and down the dictionary, and the share that pictures fill.
     dictionary: [u32; 2],
     filled: f64,
@@ -142,7 +146,10 @@ impl Summary {
         let levels = report.header.levels.iter().zip(&report.wood);
         let [skeleton, visibility, making, light, dictionary] =
             report.times.map(|t| t.as_secs_f64());
+        let to_sun = DVec3::new(0.0, 1.0, 1.0).normalize();
+        let sunlit = |to_eye| report.light.sunlit(to_sun, to_eye);
         Ok(Self {
+            light: [sunlit(to_sun), sunlit(-to_sun), report.light.sky],
             output: args.output.clone(),
             bytes: std::fs::metadata(&args.output)?.len(),
             materials: report
@@ -224,6 +231,11 @@ impl Summary {
                 l.hidden
             );
         }
+        let [behind, against, sky] = self.light.map(|share| 100.0 * share);
+        eprintln!(
+            "light: points, views and volumes of this pack show {behind:.0} % of a sun behind the eye, \
+             {against:.0} % of one against it, {sky:.0} % of the sky"
+        );
         let [w, h] = self.dictionary;
         eprintln!(
             "{}: dictionary {w} × {h}, {:.0} % filled, {}, {:.2} s",

@@ -51,7 +51,7 @@ enum Command {
     Foliage(foliage::Args),
     /// Photograph a tree from all around: RGBA images and a transforms.json.
     Capture(capture::Args),
-    /// Write views as textures for engines: PNG, EXR, KTX2; points as PLY.
+    /// Write what engines read: views as PNG, EXR, KTX2; foliage as glb; points as PLY.
     Export(export::Args),
     /// Make a landscape of packs, or plant the trees of a scene file anew.
     Scene(scene::Args),

@@ -61,11 +61,10 @@ pub(crate) fn run(args: &Args, gpu: &Gpu, pack: &Pack, angles: [f64; 2]) -> Resu
     gpu.finish()?;
     let truth = match &args.truth {
         None => None,
-        Some(path) => Some(Truth::load(path, args.max_triangles)?.picture(
-            &camera,
-            &settings.light,
-            settings.side,
-        )),
+        Some(path) => {
+            let truth = Truth::load(path, args.max_triangles, model.crown().is_some())?;
+            Some(truth.picture(&camera, &settings.light, settings.side))
+        }
     };
     let half = args.size[0] as f32 * 0.5;
     let look = Look {

@@ -19,9 +19,9 @@ pub(crate) struct TruthWorker {
 }
 
 impl TruthWorker {
-    /// Reads the tree and starts the thread.
-    pub(crate) fn start(path: &Path, max_triangles: u64) -> Result<Self> {
-        let truth = Truth::load(path, max_triangles)?;
+    /// Reads the tree and starts the thread; `shadows` is that of [`Truth::load`].
+    pub(crate) fn start(path: &Path, max_triangles: u64, shadows: bool) -> Result<Self> {
+        let truth = Truth::load(path, max_triangles, shadows)?;
         let (requests, inbox) = channel::<Request>();
         let (outbox, pictures) = channel();
         std::thread::Builder::new().name("truth".into()).spawn(move || {

@@ -139,10 +139,11 @@ impl Viewer {
         let target = renderer.target(&gpu, screen.size(), settings.side)?;
         let presenter = Presenter::new(&gpu, screen.format())?;
         let orbit = Orbit::new(session.model().bounds(), angles, args.distance, screen.size());
+        let shadows = session.model().crown().is_some();
         let truth = args
             .truth
             .as_deref()
-            .map(|path| TruthWorker::start(path, args.max_triangles))
+            .map(|path| TruthWorker::start(path, args.max_triangles, shadows))
             .transpose()?;
         let mut viewer = Self {
             window,

@@ -42,6 +42,8 @@ pub struct BakeReport {
     pub leaves: usize,
     /// Share of the dictionary that its pictures fill.
     pub filled: f64,
+    /// What points, views and volumes of the pack show of the light.
+    pub light: CrownLight,
     /// Skeleton, visibility, levels, light, dictionary.
     pub times: [Duration; 5],
 }
@@ -168,6 +170,7 @@ pub fn bake(
         wood: levels.iter().map(|l| l.errors).collect(),
         leaves: leaves.len(),
         filled: texels as f64 / all as f64,
+        light: crown_light,
         times: [skeleton, looking, making, lighting.1, lighting.0 + start.elapsed()],
     })
 }

@@ -103,6 +103,11 @@ impl<'p> Model<'p> {
         self.foliage.as_ref().map(|f| &f.block)
     }
 
+    /// What of the light its crown shows, if the pack knows it: what stands for shadows on all but foliage.
+    pub fn crown(&self) -> Option<&CrownLight> {
+        self.crown.as_ref()
+    }
+
     /// The measured table, if the pack has one.
     pub fn measures(&self) -> Option<&Measures> {
         self.measures.as_ref()
