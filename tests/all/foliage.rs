@@ -3,7 +3,7 @@
 use crate::support::{arg, inspect, repo, run, succeed};
 use forest_draw::FoliageScene;
 use forest_foliage::{
-    FoliageBlock, FoliageError, FoliageOptions, PartsOptions, Pose, Posed, Sway, Wind,
+    FoliageBlock, FoliageError, FoliageOptions, Hung, PartsOptions, Pose, Posed, Sway, Wind,
 };
 use forest_pack::Pack;
 use forest_raster::{Light, Sampling, Style, Surfaces, rasterize};
@@ -233,7 +233,7 @@ fn no_branch_stretches_in_a_gale() {
         for (i, b) in (0..).zip(block.branches) {
             let rest =
                 |s: f32| Vec3::from(b.base) + (Vec3::from(b.linear) + Vec3::from(b.square) * s) * s;
-            let at = |s: f32| pose.place(block.branches, i, s, rest(s));
+            let at = |s: f32| pose.place(block.branches, Hung::new(i, s), rest(s));
             let length = |place: &dyn Fn(f32) -> Vec3| -> f32 {
                 (0..50).map(|k| place(k as f32 / 50.0).distance(place((k + 1) as f32 / 50.0))).sum()
             };
@@ -241,7 +241,8 @@ fn no_branch_stretches_in_a_gale() {
             assert!((ratio - 1.0).abs() < 0.01, "branch {i} at {time} s: {ratio}");
             // It stays where it grows.
             if let Some(p) = block.branches.get(b.parent as usize) {
-                let on_parent = pose.place(block.branches, b.parent, b.at, b.base.into());
+                let on_parent =
+                    pose.place(block.branches, Hung::new(b.parent, b.at), b.base.into());
                 assert!(on_parent.distance(at(0.0)) < 1e-4 * p.length, "branch {i}");
             }
             moved_most = moved_most.max(at(1.0).distance(rest(1.0)) / b.length);

@@ -2,7 +2,7 @@
 
 use crate::support::{arg, repo, run, succeed};
 use forest_draw::FoliageScene;
-use forest_foliage::{BranchRecord, FoliageBlock, NO_BRANCH, Pose, Wind};
+use forest_foliage::{BranchRecord, FoliageBlock, Hung, NO_BRANCH, Pose, Wind};
 use forest_import::{Block, Limits};
 use forest_pack::Pack;
 use forest_raster::{Light, Sampling, Style, Surfaces, rasterize};
@@ -144,9 +144,8 @@ fn a_readers_wind_bends_branches_as_ours() {
         for (i, v) in block.vertices[level].iter().enumerate() {
             let [branch, s] = on[i];
             let rest = Vec3::from(places[i]) - origin;
-            let theirs = pose.place(&records, branch as u32, s, rest);
-            let s = f32::from(v.along) / 65535.0;
-            let want = ours.place(block.branches, v.branch.into(), s, v.position.into());
+            let theirs = pose.place(&records, Hung::new(branch as u32, s), rest);
+            let want = ours.place(block.branches, v.hung, v.position.into());
             assert!(theirs.distance(want) < 1e-4, "vertex {i}: {theirs}, not {want}");
             moved = moved.max(theirs.distance(rest));
             // Wood does not turn, and nothing turns about a place far away.

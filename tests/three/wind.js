@@ -1,11 +1,6 @@
 // Bends a level of foliage by the wind's attributes of its glb: what an engine's vertex shader would do, on the CPU.
 import { Quaternion, Vector3 } from 'three';
 
-// As in the pack's SPEC.md, section 8: mean displacement, and how far, how fast and where in its turn each sine swings.
-const STEADY = 0.6;
-const SWINGS = [[0.28, 1, 0], [0.12, 1.618, 0.3], [0.22, 0.786, 0.5], [0.11, 1.272, 0.7]];
-const RISE = 0.3;
-const HERTZ = 0.35;
 const STEPS = 16;
 
 const up = new Vector3(0, 1, 0);
@@ -24,11 +19,11 @@ export async function windOf(parser) {
     const parent = view.getUint32(i * info.byteStride + 12, true);
     return { base: v(0).add(origin), parent, linear: v(4), at: f(7), square: v(8), flexibility: f(12), phase: f(13), frequency: f(14) };
   });
-  return { count: branches.length, bend: (node, wind) => bend(node, branches, poses(branches, wind)) };
+  return { count: branches.length, bend: (node, wind) => bend(node, branches, poses(info, branches, wind)) };
 }
 
 /** How each branch stands: parents come before their children. */
-function poses(branches, { strength, time }) {
+function poses({ steady, swings, rise, frequency }, branches, { strength, time }) {
   const all = [];
   for (const b of branches) {
     const own = { turn: new Quaternion(), base: b.base.clone() };
@@ -37,9 +32,9 @@ function poses(branches, { strength, time }) {
       own.turn.setFromAxisAngle(parent.axis, parent.angle * b.at).premultiply(parent.turn);
       own.base = place(branches[b.parent], parent, b.at, b.base);
     }
-    const swing = ([far, fast, shift]) => far * Math.sin(2 * Math.PI * (time * HERTZ * b.frequency * fast + b.phase + shift));
-    const [a, c, d, e] = SWINGS.map(swing);
-    const push = direction.clone().multiplyScalar(STEADY + a + c).addScaledVector(side, d + e).addScaledVector(up, RISE * (d + e));
+    const swing = ([far, fast, shift]) => far * Math.sin(2 * Math.PI * (time * frequency * b.frequency * fast + b.phase + shift));
+    const [a, c, d, e] = swings.map(swing);
+    const push = direction.clone().multiplyScalar(steady + a + c).addScaledVector(side, d + e).addScaledVector(up, rise * (d + e));
     push.multiplyScalar(strength * b.flexibility).applyQuaternion(own.turn.clone().invert());
     const along = b.linear.clone().add(b.square).normalize();
     push.addScaledVector(along, -push.dot(along));

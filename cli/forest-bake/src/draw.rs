@@ -73,11 +73,12 @@ pub(crate) struct Args {
     /// volume.
     #[arg(long, default_value_t = 1.0, value_name = "PX", value_parser = positive_wide)]
     texel: f64,
-    /// Wind that foliage, and points in a pack with foliage, stand in: its strength (0 calm, 1 a gale, at most 2), or STRENGTH,SECONDS at
-    /// a moment.
+    /// Wind that foliage, and points in a pack with foliage, stand in: its strength (0 calm, 1 a gale, at
+    /// most 2), or STRENGTH,SECONDS at a moment.
     #[arg(long, default_value = "0", value_name = "WIND")]
     wind: Wind,
-    /// Light: a sun with shadows on foliage, and by its crown on all else in a pack with foliage; none in others.
+    /// Light: a sun with shadows on foliage, and by its crown on all else in a pack with foliage; none
+    /// in others.
     #[arg(long, value_enum, default_value = "sun")]
     light: LightArg,
     /// Samples a side of a pixel.

@@ -97,7 +97,8 @@ pub(crate) struct Args {
     /// Pictures a second of --sequence.
     #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=240))]
     pub(crate) rate: u16,
-    /// Light: a sun with shadows on foliage, and by its crown on all else in a pack with foliage; none in others.
+    /// Light: a sun with shadows on foliage, and by its crown on all else in a pack with foliage; none
+    /// in others.
     #[arg(long, value_enum, default_value = "sun")]
     pub(crate) light: LightArg,
     /// L_m over L_M of the estimated self-shadow: the share of the sun at the side of the tree that is

@@ -1,7 +1,6 @@
 //! A tree into the sections of the foliage representation.
 
 use crate::block::{dictionary_material, dictionary_texture, level_soup};
-use crate::branch::OnBranch;
 use crate::cover::cover;
 use crate::crown::CrownLight;
 use crate::dictionary::{Layout, MOST_SIDE, atlas, encode};
@@ -16,6 +15,7 @@ use crate::thick::WoodErrors;
 use crate::validate::validate;
 use crate::visible::Visible;
 use crate::weld::Welded;
+use crate::wind::Hung;
 use crate::wood::Wood;
 use forest_pack::{Codec, PackWriter, SectionId, header, kind};
 use forest_points::record::encode_axis;
@@ -246,12 +246,11 @@ impl Packing<'_> {
         let mut vertices = Vec::new();
         let mut by_material: Vec<(u16, Vec<[u32; 3]>)> = Vec::new();
         vertices.extend(level.thick.vertices.iter().map(|v| {
-            let (branch, along) = self.on(v.on);
+            let (record, share) = self.wood.rig.place(v.on);
             VertexRecord {
                 position: v.position.as_vec3().to_array(),
                 uv: v.uv.as_vec2().to_array(),
-                branch,
-                along,
+                hung: Hung::new(record, share),
                 normal: encode_axis(v.normal),
                 openness: (v.skylit * 255.0).round() as u8,
                 color: color(v.color),
@@ -289,11 +288,6 @@ impl Packing<'_> {
         Arrays { header, vertices, indices }
     }
 
-    fn on(&self, on: OnBranch) -> (u16, u16) {
-        let (record, s) = self.wood.rig.place(on);
-        (record as u16, (s * 65535.0).round() as u16)
-    }
-
     fn panel(
         &self,
         placed: &Placed,
@@ -316,8 +310,7 @@ impl Packing<'_> {
             vertices.push(VertexRecord {
                 position: p.as_vec3().to_array(),
                 uv,
-                branch: placed.on as u16,
-                along: (along * 65535.0).round() as u16,
+                hung: Hung::new(placed.on, *along),
                 pivot: pivot.to_array().map(|v| v.round().clamp(-limit, limit) as i16),
                 phase: (golden.fract() * 65536.0) as u16,
                 normal: encode_axis((p - self.crown).normalize_or(DVec3::Y)),

@@ -275,7 +275,6 @@ impl Posed {
 
     /// Place and normal of a vertex.
     pub(crate) fn place(&self, block: &FoliageBlock, v: &VertexRecord) -> (Vec3, Vec3) {
-        let (branch, s) = (u32::from(v.branch), f32::from(v.along) / 65535.0);
         let mut p = Vec3::from(v.position);
         if v.flutter > 0 {
             let step = block.header.pivot_step as f32;
@@ -286,7 +285,7 @@ impl Posed {
             let axis = (self.eye - pivot).normalize_or(Vec3::Z);
             p = pivot + glam::Quat::from_axis_angle(axis, angle) * (p - pivot);
         }
-        let normal = self.pose.direction(branch, s, decode_axis(v.normal).as_vec3());
-        (self.pose.place(block.branches, branch, s, p), normal)
+        let normal = self.pose.direction(v.hung, decode_axis(v.normal).as_vec3());
+        (self.pose.place(block.branches, v.hung, p), normal)
     }
 }

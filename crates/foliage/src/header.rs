@@ -1,5 +1,6 @@
 //! The header and records of the foliage representation.
 
+use crate::wind::Hung;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
@@ -89,10 +90,8 @@ pub struct VertexRecord {
     pub position: [f32; 3],
     /// Texture coordinates, v down.
     pub uv: [f32; 2],
-    /// The branch record that moves it.
-    pub branch: u16,
-    /// How far along that branch, 0 … 65535 from base to tip.
-    pub along: u16,
+    /// What moves it.
+    pub hung: Hung,
     /// From `position` to the pivot about which its card turns, in the header's steps.
     pub pivot: [i16; 3],
     /// Phase of that turning, 65536 to a turn.

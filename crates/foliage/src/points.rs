@@ -3,8 +3,7 @@
 //! to the other moves nothing in the wind.
 
 use crate::block::FoliageBlock;
-use crate::wind::Pose;
-use bytemuck::{Pod, Zeroable};
+use crate::wind::{Hung, Pose};
 use forest_pack::{Codec, Pack, PackError, PackWriter, SectionId, kind};
 use forest_points::PointsBlock;
 use glam::{DVec3, Vec3};
@@ -16,23 +15,6 @@ use std::borrow::Cow;
 /// Sections of points and of triangles.
 const POINTS: SectionId = SectionId::new(kind::WIND_POINTS, 0);
 const CORNERS: SectionId = SectionId::new(kind::WIND_TRIANGLES, 0);
-
-/// What moves a point: 4 bytes, as shaders read them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Hung {
-    /// The branch record.
-    pub branch: u16,
-    /// How far along that branch, 0 … 65535 from base to tip.
-    pub along: u16,
-}
-
-impl Hung {
-    /// How far along, `0..=1`.
-    pub fn share(self) -> f32 {
-        f32::from(self.along) / 65535.0
-    }
-}
 
 /// What moves each point of a block, and each corner of its triangles.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,14 +127,14 @@ impl<'a> BentPoints<'a> {
     pub fn place(&self, hung: Hung, place: DVec3) -> DVec3 {
         let rest = (place - self.foliage.origin()).as_vec3();
         let branches = self.foliage.branches;
-        let moved = self.pose.place(branches, hung.branch.into(), hung.share(), rest);
+        let moved = self.pose.place(branches, hung, rest);
         self.foliage.origin() + moved.as_dvec3()
     }
 
     /// Which way something points there that rests along `direction`.
     pub fn direction(&self, hung: Hung, direction: DVec3) -> DVec3 {
         let rest = direction.as_vec3();
-        self.pose.direction(hung.branch.into(), hung.share(), rest).as_dvec3().normalize_or_zero()
+        self.pose.direction(hung, rest).as_dvec3().normalize_or_zero()
     }
 }
 
@@ -170,16 +152,16 @@ fn places(foliage: &FoliageBlock) -> Vec<Place> {
             let [u, v] = [i, j].map(|k| k as f32 / steps as f32);
             let weights = [1.0 - u - v, u, v];
             let most = (0..3).max_by(|a, b| weights[*a].total_cmp(&weights[*b])).unwrap_or(0);
-            let branch = corners[most].branch;
+            let hung = corners[most].hung;
             // Between corners of one branch; else as the nearest corner.
-            let along = if corners.iter().all(|c| c.branch == branch) {
-                let sum: f32 = (0..3).map(|k| weights[k] * f32::from(corners[k].along)).sum();
-                sum.round().clamp(0.0, 65535.0) as u16
+            let hung = if corners.iter().all(|c| c.hung.branch == hung.branch) {
+                let share: f32 = (0..3).map(|k| weights[k] * corners[k].hung.share()).sum();
+                Hung::new(hung.branch.into(), share)
             } else {
-                corners[most].along
+                hung
             };
             let place = a * weights[0] + b * weights[1] + c * weights[2];
-            Place::new(place.to_array(), Hung { branch, along })
+            Place::new(place.to_array(), hung)
         })
     };
     foliage.indices[0].par_iter().flat_map_iter(of).collect()

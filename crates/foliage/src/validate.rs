@@ -91,8 +91,8 @@ pub fn validate(
                 let problem = format!("vertex {i} is at {:?}, {:?}", v.position, v.uv);
                 return broken(kind::FOLIAGE_VERTICES, problem);
             }
-            if u32::from(v.branch) >= h.wind {
-                let problem = format!("vertex {i} hangs on branch {} of {}", v.branch, h.wind);
+            if u32::from(v.hung.branch) >= h.wind {
+                let problem = format!("vertex {i} hangs on branch {} of {}", v.hung.branch, h.wind);
                 return broken(kind::FOLIAGE_VERTICES, problem);
             }
         }

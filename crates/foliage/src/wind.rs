@@ -47,6 +47,32 @@ pub struct BranchRecord {
 
 const _: () = assert!(size_of::<BranchRecord>() == 64);
 
+/// Steps along a branch.
+pub const ALONG_STEPS: f32 = 65535.0;
+
+/// A place on a branch: 4 bytes, as shaders read them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Hung {
+    /// The branch record.
+    pub branch: u16,
+    /// How far along that branch, 0 … [`ALONG_STEPS`] from base to tip.
+    pub along: u16,
+}
+
+impl Hung {
+    /// On branch record `branch`, a share of its length along it; shares are kept within `0..=1`.
+    pub fn new(branch: u32, share: f32) -> Self {
+        let along = (share.clamp(0.0, 1.0) * ALONG_STEPS).round() as u16;
+        Self { branch: branch as u16, along }
+    }
+
+    /// How far along, `0..=1`.
+    pub fn share(self) -> f32 {
+        f32::from(self.along) / ALONG_STEPS
+    }
+}
+
 /// Largest flexibility.
 pub const MOST_FLEXIBLE: f32 = 0.25;
 
@@ -154,7 +180,7 @@ impl BranchRecord {
 }
 
 /// How far tips rise and fall, in what they move across the wind.
-const RISE: f32 = 0.3;
+pub const RISE: f32 = 0.3;
 
 /// Mean displacement along the wind.
 pub const STEADY: f32 = 0.6;
@@ -275,15 +301,16 @@ impl Pose {
         Self { branches }
     }
 
-    /// Where a point is that rests at `p` on branch `on` of `records`, `s` of its length along.
-    pub fn place(&self, records: &[BranchRecord], on: u32, s: f32, p: Vec3) -> Vec3 {
-        self.branches[on as usize].place(&records[on as usize], p, s)
+    /// Where a point is that rests at `p` and hangs on a branch of `records`.
+    pub fn place(&self, records: &[BranchRecord], hung: Hung, p: Vec3) -> Vec3 {
+        let on = usize::from(hung.branch);
+        self.branches[on].place(&records[on], p, hung.share())
     }
 
     /// Which way a direction points that rests along `v` there.
-    pub fn direction(&self, on: u32, s: f32, v: Vec3) -> Vec3 {
-        let pose = &self.branches[on as usize];
-        Quat::from_array(pose.turn) * turned(v, pose.axis.into(), pose.angle * s)
+    pub fn direction(&self, hung: Hung, v: Vec3) -> Vec3 {
+        let pose = &self.branches[usize::from(hung.branch)];
+        Quat::from_array(pose.turn) * turned(v, pose.axis.into(), pose.angle * hung.share())
     }
 }
 
@@ -377,7 +404,7 @@ mod tests {
         for r in [straight, bow] {
             let calm = Pose::new(&[r], &Wind::default(), 0.0);
             let p = Vec3::new(0.3, 1.0, -0.2);
-            assert!(calm.place(&[r], 0, 0.4, p).distance(p) < 1e-6);
+            assert!(calm.place(&[r], Hung::new(0, 0.4), p).distance(p) < 1e-6);
             let gale = Wind { strength: 1.5, time: 3.3, ..Wind::default() };
             let pose = Pose::new(&[r], &gale, 0.1);
             let length = |place: &dyn Fn(f32) -> Vec3| -> f32 {
@@ -385,9 +412,9 @@ mod tests {
                 (0..200).map(|i| at(i).distance(at(i + 1))).sum()
             };
             let rest = length(&|s| r.line(s));
-            let moved = length(&|s| pose.place(&[r], 0, s, r.line(s)));
+            let moved = length(&|s| pose.place(&[r], Hung::new(0, s), r.line(s)));
             assert!((moved / rest - 1.0).abs() < 1e-4, "{moved} {rest}");
-            let tip = pose.place(&[r], 0, 1.0, r.tip());
+            let tip = pose.place(&[r], Hung::new(0, 1.0), r.tip());
             assert!(tip.distance(r.tip()) > 0.05 * rest, "the tip moves");
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::CHUNK;
 use crate::landscape;
-use forest_foliage::wind::{STEADY, SWINGS};
+use forest_foliage::wind::{ALONG_STEPS, STEADY, SWINGS};
 use forest_points::{SizeCode, spheroid};
 use forest_views as views;
 use wgpu::{Device, ShaderModule, ShaderModuleDescriptor, ShaderSource};
@@ -172,6 +172,7 @@ fn constants() -> String {
     let floats = [
         ("HALF_TURN", std::f64::consts::PI),
         ("STEADY", STEADY.into()),
+        ("ALONG_STEPS", ALONG_STEPS.into()),
         ("MOST_LEAN", forest_foliage::sway::MOST_LEAN.into()),
         ("GUST", landscape::GUST),
         ("OWN_PHASE", landscape::OWN_PHASE),

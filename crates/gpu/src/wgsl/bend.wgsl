@@ -10,9 +10,8 @@ fn bent(index: u32, place: vec3f) -> vec3f {
     if frame.bends == 0u {
         return place;
     }
-    let on = hung[index] & 0xffffu;
-    let s = f32(hung[index] >> 16u) / 65535.0;
-    return frame.root + bent_place(branches[on], poses[on], place - frame.root, s);
+    let on = branch_of(hung[index]);
+    return frame.root + bent_place(branches[on], poses[on], place - frame.root, share_of(hung[index]));
 }
 
 // Which way it faces that rests facing `axis`.
@@ -20,6 +19,5 @@ fn bent_axis(index: u32, axis: vec3f) -> vec3f {
     if frame.bends == 0u {
         return axis;
     }
-    let on = hung[index] & 0xffffu;
-    return bent_direction(poses[on], axis, f32(hung[index] >> 16u) / 65535.0);
+    return bent_direction(poses[branch_of(hung[index])], axis, share_of(hung[index]));
 }

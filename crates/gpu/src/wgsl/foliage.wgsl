@@ -81,8 +81,8 @@ fn vertex(@builtin(vertex_index) index: u32, @builtin(instance_index) material: 
     );
     var normal = decode_axis(vec2u(word.w & 0xffu, word.w >> 8u & 0xffu));
     if foliage.windy != 0u {
-        let branch = word.x & 0xffffu;
-        let s = f32(word.x >> 16u) / 65535.0;
+        let branch = branch_of(word.x);
+        let s = share_of(word.x);
         let flutter = f32(word.w >> 24u) / 255.0;
         if flutter > 0.0 {
             let steps = vec3f(vec3i(vec3u(word.y << 16u, word.y, word.z << 16u)) >> vec3u(16u));

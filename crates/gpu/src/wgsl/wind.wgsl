@@ -24,6 +24,15 @@ struct BranchPose {
     spare: f32,
 }
 
+// The branch of forest_foliage::Hung, and how far along it.
+fn branch_of(hung: u32) -> u32 {
+    return hung & 0xffffu;
+}
+
+fn share_of(hung: u32) -> f32 {
+    return f32(hung >> 16u) / ALONG_STEPS;
+}
+
 fn rotated(q: vec4f, v: vec3f) -> vec3f {
     let t = 2.0 * cross(q.xyz, v);
     return v + q.w * t + cross(q.xyz, t);

@@ -74,9 +74,8 @@ impl<'a> Levels<'a> {
         let normals: Vec<[f32; 3]> = soup.normals.iter().map(|n| n.to_array()).collect();
         let uvs: Vec<[f32; 2]> = soup.uvs.iter().map(|t| t.to_array()).collect();
         let pivots: Vec<[f32; 2]> =
-            vertices.iter().map(|v| self.pivots.texel(v.branch.into())).collect();
-        let branch =
-            |v: &forest_foliage::VertexRecord| [f32::from(v.branch), f32::from(v.along) / 65535.0];
+            vertices.iter().map(|v| self.pivots.texel(v.hung.branch.into())).collect();
+        let branch = |v: &forest_foliage::VertexRecord| [f32::from(v.hung.branch), v.hung.share()];
         let branches: Vec<[f32; 2]> = vertices.iter().map(branch).collect();
         let leaf: Vec<[f32; 3]> = vertices
             .iter()

@@ -10,7 +10,8 @@ mod planes;
 use crate::ExportError;
 use crate::picture::ExportFile;
 use buffer::Binary;
-use forest_foliage::{BranchRecord, FoliageBlock};
+use forest_foliage::wind::{RISE, STEADY, SWINGS};
+use forest_foliage::{BranchRecord, FoliageBlock, Wind};
 use forest_views::ViewsBlock;
 use glam::DVec3;
 use gltf::binary::{Glb, Header};
@@ -81,6 +82,10 @@ pub fn levels(
         "bufferView": wind,
         "branches": foliage.branches.len(),
         "byteStride": size_of::<BranchRecord>(),
+        "steady": STEADY,
+        "swings": SWINGS.to_vec(),
+        "rise": RISE,
+        "frequency": Wind::default().frequency,
         "origin": (foliage.origin() - place).to_array().to_vec(),
     });
     let mut used = materials.used;
