@@ -22,6 +22,9 @@ struct MaterialRecord {
     /// Bit 0: unlit. Bit 1: its triangles have vertex colours. From bit 8: translucency in steps.
     flags: u32,
     image: u32,
+    relief: u32,
+    relief_scale: f32,
+    zero: [u32; 2],
 }
 
 /// `Image` of surface.wgsl.
@@ -89,7 +92,19 @@ fn material_record(m: &Material, range: &UvRange, colors: bool) -> MaterialRecor
     let through = (f64::from(m.translucency) * TRANSLUCENCY_STEPS).round() as u32;
     let flags = u32::from(m.unlit) | u32::from(colors) << 1 | through << 8;
     let (uv_min, uv_step) = (range.min, range.step);
-    MaterialRecord { base: m.base_color, uv_min, uv_step, rule, cutoff, flags, image }
+    let (relief, relief_scale) = m.relief.map_or((u32::MAX, 0.0), |r| (r.texture, r.scale));
+    MaterialRecord {
+        base: m.base_color,
+        uv_min,
+        uv_step,
+        rule,
+        cutoff,
+        flags,
+        image,
+        relief,
+        relief_scale,
+        zero: [0; 2],
+    }
 }
 
 fn image_record(t: &Texture, place: &Place) -> ImageRecord {

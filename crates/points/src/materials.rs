@@ -2,7 +2,7 @@
 
 use forest_pack::header::{self, MaterialHeader, Materials, TextureHeader};
 use forest_pack::{Compressed, Pack, PackError, PackWriter, SectionId, kind};
-use forest_soup::{AlphaMode, Material, Texture, Wrap};
+use forest_soup::{AlphaMode, Material, Relief, Texture, Wrap};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -51,6 +51,12 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
         if m.texture.is_some_and(|t| t as usize >= count) {
             return Err(invalid(format!("material {i} uses texture {:?} of {count}", m.texture)));
         }
+        let relief = m.relief.map(|(texture, scale)| Relief { texture, scale });
+        if let Some(r) = relief.filter(|r| r.texture as usize >= count || !r.scale.is_finite()) {
+            let (t, scale) = (r.texture, r.scale);
+            let problem = format!("material {i} uses normal texture {t} of {count}, times {scale}");
+            return Err(invalid(problem));
+        }
         if !(0.0..=1.0).contains(&m.translucency) {
             let share = m.translucency;
             return Err(invalid(format!(
@@ -69,6 +75,7 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
             name: m.name,
             base_color: m.base_color,
             texture: m.texture,
+            relief,
             alpha_mode,
             double_sided: m.double_sided,
             unlit: m.unlit,
@@ -122,6 +129,7 @@ fn material_header(m: &Material) -> MaterialHeader {
         name: m.name.clone(),
         base_color: m.base_color,
         texture: m.texture,
+        relief: m.relief.map(|r| (r.texture, r.scale)),
         alpha_mode,
         alpha_cutoff,
         double_sided: m.double_sided,

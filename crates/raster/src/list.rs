@@ -4,7 +4,7 @@ use crate::plane::{Edges, Plane};
 use crate::shadow::ShadowMap;
 use crate::sprite::Sprite;
 use crate::surface::{Surface, Surfaces};
-use forest_soup::{Camera, Projection};
+use forest_soup::{Camera, Projection, Tangents};
 use glam::{DVec2, DVec3, IVec2, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -77,9 +77,18 @@ pub(crate) struct Triangle<'a> {
     colors: Option<Box<[[f32; 4]; 3]>>,
     /// Towards the eye.
     normals: [Vec3; 3],
+    relief: Option<Box<Bumps>>,
     sunlit: [f32; 3],
     skylit: [f32; 3],
     pub(crate) surface: &'a Surface,
+}
+
+/// What turns a triangle's normals.
+#[derive(Clone, Copy, Debug)]
+struct Bumps {
+    tangents: Tangents,
+    /// Its front is seen.
+    front: bool,
 }
 
 /// Projects into one camera's picture.
@@ -260,6 +269,11 @@ impl<'a> Triangle<'a> {
             let n = if c.normal == Vec3::ZERO { own.as_vec3() } else { c.normal };
             if away { -n } else { n }
         });
+        let relief = surface.relief().and_then(|_| {
+            let places = [DVec3::ZERO, b - a, c - a].map(|p| p.as_vec3());
+            let tangents = Tangents::new(places, corners.map(|c| c.uv))?;
+            Some(Box::new(Bumps { tangents, front: !away }))
+        });
         let plain = corners.iter().all(|c| c.color == [1.0; 4]);
         Some(Self {
             id,
@@ -275,6 +289,7 @@ impl<'a> Triangle<'a> {
             uvs: corners.map(|c| c.uv),
             colors: (!plain).then(|| Box::new(corners.map(|c| c.color))),
             normals,
+            relief,
             sunlit: corners.map(|c| c.sunlit),
             skylit: corners.map(|c| c.skylit),
             surface,
@@ -312,9 +327,16 @@ impl<'a> Triangle<'a> {
     pub(crate) fn shade(&self, x: f64, y: f64) -> Fragment {
         let w = self.weights(self.edges.weights(x, y).map(|w| w as f32));
         let [a, b, c] = self.normals;
+        let uv = self.uv(w);
+        let normal = (a * w[0] + b * w[1] + c * w[2]).normalize_or_zero();
         Fragment {
-            rgb: self.surface.at(self.uv(w), self.tint(w)).0,
-            normal: (a * w[0] + b * w[1] + c * w[2]).normalize_or_zero(),
+            rgb: self.surface.at(uv, self.tint(w)).0,
+            normal: match (&self.relief, self.surface.relief()) {
+                (Some(bumps), Some(map)) => {
+                    bumps.tangents.turn(normal, bumps.front, map.sample(uv, 1.0))
+                }
+                _ => normal,
+            },
             unlit: self.surface.is_unlit(),
             scattered: self.surface.is_scattered(),
             translucency: self.surface.translucency(),

@@ -11,7 +11,7 @@ use crate::opacity::covers;
 use crate::picture::Picture;
 use crate::surface::Surfaces;
 use crate::trace::{Ball, LIFT, Sample, Seen, View, hierarchy, ray, units, window};
-use forest_soup::{Camera, TriangleSoup};
+use forest_soup::{Camera, Tangents, TriangleSoup};
 use glam::{Vec2, Vec3, Vec3A};
 use obvhs::cwbvh::CwBvh;
 use obvhs::ray::{Ray, RayHit};
@@ -157,7 +157,12 @@ impl<'a> RayScene<'a> {
         let material = self.soup.triangle_materials[self.ids[hit.i] as usize];
         let surface = self.surfaces.get(material)?;
         let rgb = surface.at(uv, tint).0;
-        let (own, normal) = self.normals(hit.i, hit.at, direction);
+        let (own, mut normal) = self.normals(hit.i, hit.at, direction);
+        if let Some(map) = surface.relief()
+            && let Some(tangents) = self.tangents(hit.i)
+        {
+            normal = tangents.turn(normal, self.is_front(hit.i, direction), map.sample(uv, 1.0));
+        }
         let (unlit, translucency) = (surface.is_unlit(), surface.translucency());
         Some(Seen { rgb, unlit, translucency, own, normal })
     }
@@ -191,11 +196,28 @@ impl<'a> RayScene<'a> {
         (uv, tint)
     }
 
+    /// The triangle's own normal: a unit vector, or zero.
+    fn own(&self, i: usize) -> Vec3 {
+        let t = &self.triangles[i];
+        Vec3::from((t.v1 - t.v0).cross(t.v2 - t.v0)).normalize_or_zero()
+    }
+
+    /// Whether a ray of this direction sees the front of triangle `i`.
+    fn is_front(&self, i: usize, direction: Vec3) -> bool {
+        self.own(i).dot(direction) <= 0.0
+    }
+
+    /// Which way the texture coordinates of triangle `i` grow.
+    fn tangents(&self, i: usize) -> Option<Tangents> {
+        let id = self.ids[i] as usize;
+        let uv = |v: u32| self.soup.uvs.get(v as usize).copied().unwrap_or(Vec2::ZERO);
+        Tangents::new(self.soup.corners(id), self.soup.triangles[id].map(uv))
+    }
+
     /// The triangle's own normal and the interpolated one, both turned as the own one faces the eye.
     fn normals(&self, i: usize, m: Meeting, direction: Vec3) -> (Vec3, Vec3) {
-        let t = &self.triangles[i];
-        let own = Vec3::from((t.v1 - t.v0).cross(t.v2 - t.v0)).normalize_or_zero();
-        let sign = if own.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        let own = self.own(i);
+        let sign = if self.is_front(i, direction) { 1.0 } else { -1.0 };
         let shading = match &self.soup.normals[..] {
             [] => own,
             n => {

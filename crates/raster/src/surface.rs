@@ -1,6 +1,6 @@
 //! Materials, ready to be sampled.
 
-use forest_soup::{AlphaMode, Material, ShadedTexture, Texture};
+use forest_soup::{AlphaMode, Material, NormalMap, Relief, ShadedTexture, Texture};
 use glam::Vec2;
 use std::sync::Arc;
 
@@ -26,6 +26,7 @@ impl Surfaces {
 pub(crate) struct Surface {
     material: Material,
     texture: Option<ShadedTexture>,
+    relief: Option<NormalMap>,
     /// Some of it may be seen through.
     pub(crate) translucent: bool,
 }
@@ -40,8 +41,10 @@ impl Surface {
         let [r, g, b, _] = material.base_color;
         let raw = Material { alpha_mode, base_color: [r, g, b, 1.0], ..material.clone() };
         let texture = material.texture.map(|t| ShadedTexture::new(&textures[t as usize], &raw));
+        let map = |r: Relief| NormalMap::new(&textures[r.texture as usize], r.scale);
+        let relief = material.relief.map(map);
         let translucent = material.alpha_mode != AlphaMode::Opaque;
-        Self { material: material.clone(), texture, translucent }
+        Self { material: material.clone(), texture, relief, translucent }
     }
 
     pub(crate) fn is_scattered(&self) -> bool {
@@ -55,6 +58,11 @@ impl Surface {
 
     pub(crate) fn is_unlit(&self) -> bool {
         self.material.unlit
+    }
+
+    /// Its normal texture.
+    pub(crate) fn relief(&self) -> Option<&NormalMap> {
+        self.relief.as_ref()
     }
 
     /// Coverage under vertex alpha `tint`: that of [`Surface::at`], at less cost.
@@ -77,9 +85,10 @@ impl Surface {
         self.tinted(self.texture.as_ref().map(|t| t.sample_area(uv, texels)), tint)
     }
 
-    /// Texels of its texture; 0 without one.
+    /// Texels of its texture, or of its normal texture if there is no other; 0 without both.
     pub(crate) fn texels(&self) -> f32 {
-        self.texture.as_ref().map_or(0.0, ShadedTexture::texels)
+        let own = self.texture.as_ref().map(ShadedTexture::texels);
+        own.or(self.relief.as_ref().map(NormalMap::texels)).unwrap_or(0.0)
     }
 
     /// Mean over a triangle of what it shows: linear RGB weighted by alpha, not premultiplied;

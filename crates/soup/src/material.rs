@@ -1,4 +1,6 @@
-//! What a triangle's surface looks like: base colour and coverage, nothing else.
+//! What a triangle's surface looks like: base colour, coverage, bumps and what shines through.
+
+use crate::Relief;
 
 /// How the alpha of a material becomes coverage (glTF 2.0, section 3.9.5).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -24,6 +26,8 @@ pub struct Material {
     pub base_color: [f32; 4],
     /// Index into the textures of the model.
     pub texture: Option<u32>,
+    /// Its normal texture, which has the coordinates of the other.
+    pub relief: Option<Relief>,
     /// How alpha becomes coverage.
     pub alpha_mode: AlphaMode,
     /// Both faces are seen. Bakers treat every surface as two-sided (a leaf has no inside);
@@ -45,6 +49,7 @@ impl Default for Material {
             name: String::new(),
             base_color: [1.0; 4],
             texture: None,
+            relief: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: false,
             unlit: false,

@@ -45,11 +45,16 @@ impl ShadedTexture {
             }
         });
         let translucent = texels.par_iter().any(|t| t[3] != u16::MAX);
-        let mut levels = vec![Level { width: w, height: h, texels }];
-        while let Some(next) = levels.last().and_then(Level::halved) {
-            levels.push(next);
-        }
+        let levels = with_coarser(Level { width: w, height: h, texels });
         Self { levels, wrap: texture.wrap, translucent }
+    }
+
+    /// A texture of numbers, not of colours: no curve, no coverage.
+    pub(crate) fn data(texture: &Texture) -> Self {
+        let wide = |t: &[u8; 4]| [t[0], t[1], t[2], u8::MAX].map(|v| u16::from(v) * 257);
+        let texels = texture.texels.par_iter().map(wide).collect();
+        let finest = Level { width: texture.width, height: texture.height, texels };
+        Self { levels: with_coarser(finest), wrap: texture.wrap, translucent: false }
     }
 
     /// Texels of the finest level.
@@ -177,6 +182,15 @@ impl Bilinear {
             fy: y - y0,
         }
     }
+}
+
+/// All levels down to a single texel, finest first.
+fn with_coarser(finest: Level) -> Vec<Level> {
+    let mut levels = vec![finest];
+    while let Some(next) = levels.last().and_then(Level::halved) {
+        levels.push(next);
+    }
+    levels
 }
 
 impl Level {

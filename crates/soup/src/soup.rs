@@ -99,6 +99,12 @@ impl TriangleSoup {
                 let t = self.textures.len();
                 return fail(format!("material {i} uses texture {:?} of {t}", material.texture));
             }
+            if let Some(r) = material.relief
+                && (r.texture as usize >= self.textures.len() || !r.scale.is_finite())
+            {
+                let (t, n, scale) = (r.texture, self.textures.len(), r.scale);
+                return fail(format!("material {i} uses normal texture {t} of {n}, times {scale}"));
+            }
         }
         for texture in &self.textures {
             let (w, h, have) = (texture.width, texture.height, texture.texels.len());

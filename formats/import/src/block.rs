@@ -1,7 +1,7 @@
 //! Blocks: one file, or several with placements.
 
 use crate::{ImportError, Limits, load};
-use forest_soup::{Instance, Material, Model, Placement};
+use forest_soup::{Instance, Material, Model, Placement, Relief};
 use glam::{DQuat, DVec3};
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -219,11 +219,11 @@ fn add(to: &mut Model, from: Model, file: &Path) -> Result<Vec<Instance>, Import
         m.material += material;
         m
     }));
-    to.materials.extend(
-        from.materials
-            .into_iter()
-            .map(|m| Material { texture: m.texture.map(|t| t + texture), ..m }),
-    );
+    to.materials.extend(from.materials.into_iter().map(|m| Material {
+        texture: m.texture.map(|t| t + texture),
+        relief: m.relief.map(|r| Relief { texture: r.texture + texture, ..r }),
+        ..m
+    }));
     to.textures.extend(from.textures);
     Ok(from.instances.into_iter().map(|i| Instance { mesh: i.mesh + mesh, ..i }).collect())
 }

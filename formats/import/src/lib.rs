@@ -10,7 +10,8 @@
 //! KHR_materials_unlit, KHR_materials_diffuse_transmission (its factor),
 //! KHR_materials_pbrSpecularGlossiness (base colour), KHR_mesh_quantization,
 //! EXT_mesh_gpu_instancing, EXT_meshopt_compression, EXT_texture_webp; the Wavefront OBJ and MTL
-//! notes of P. Bourke.
+//! notes of P. Bourke. Normal textures are read where they have the coordinates of the base colour's, of OBJ
+//! files from `norm`, or from `map_Bump` if its picture is one of normals.
 //!
 //! ```
 //! let dir = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ mod lines;
 use crate::picture;
 use crate::source::Source;
 use earcut::{Earcut, utils3d};
-use forest_soup::{AlphaMode, Instance, Material, Mesh, Model, Placement, Texture, Wrap};
+use forest_soup::{AlphaMode, Instance, Material, Mesh, Model, Placement, Relief, Texture, Wrap};
 use glam::{Vec2, Vec3};
 use image::DynamicImage;
 use std::cell::RefCell;
@@ -158,11 +158,13 @@ struct MapOptions {
     scale: [f32; 2],
     offset: [f32; 2],
     wrap: Wrap,
+    /// What multiplies bumps.
+    bumps: f32,
 }
 
 impl Default for MapOptions {
     fn default() -> Self {
-        Self { scale: [1.0; 2], offset: [0.0; 2], wrap: Wrap::Repeat }
+        Self { scale: [1.0; 2], offset: [0.0; 2], wrap: Wrap::Repeat, bumps: 1.0 }
     }
 }
 
@@ -202,6 +204,9 @@ impl MapOptions {
             match name {
                 "s" => options.scale = [number(0, 1.0), number(1, 1.0)],
                 "o" => options.offset = [number(0, 0.0), number(1, 0.0)],
+                "bm" => {
+                    options.bumps = Some(number(0, 1.0)).filter(|s| s.is_finite()).unwrap_or(1.0)
+                }
                 "clamp" if words.first() == Some(&"on") => options.wrap = Wrap::Clamp,
                 _ => {}
             }
@@ -209,6 +214,14 @@ impl MapOptions {
         }
         (options, rest)
     }
+}
+
+/// Whether a picture holds normals, not heights: its mean looks out of the surface, and heights are grey.
+fn holds_normals(texture: &Texture) -> bool {
+    let count = texture.texels.len() as f64;
+    let mean = |k: usize| texture.texels.iter().map(|t| f64::from(t[k])).sum::<f64>() / count;
+    let near = |k: usize| (mean(k) - 127.5).abs() < 32.0;
+    near(0) && near(1) && mean(2) > 191.0
 }
 
 /// Images by name, so that leaves sharing one decode it once.
@@ -237,7 +250,8 @@ impl Pictures {
             (None, None) => 1.0,
         };
         let diffuse = if color.is_some() { [1.0; 3] } else { m.diffuse.unwrap_or([0.8; 3]) };
-        let options = color.or(alpha).map_or(MapOptions::default(), |c| c.0);
+        let options = color.or(alpha).map(|c| c.0);
+        let (relief, options) = self.relief(source, &element, m, textures, options);
         let mut translucent = dissolve < 1.0;
         let texture = if color.is_some() || alpha.is_some() {
             let names = (color.map(|c| c.1.to_string()), alpha.map(|a| a.1.to_string()));
@@ -262,6 +276,7 @@ impl Pictures {
             name: m.name.clone(),
             base_color: [r, g, b, dissolve.clamp(0.0, 1.0)],
             texture,
+            relief,
             alpha_mode: if translucent { AlphaMode::Blend } else { AlphaMode::Opaque },
             double_sided: true,
             unlit: m.illumination_model == Some(0),
@@ -269,6 +284,46 @@ impl Pictures {
             scattered: false,
         };
         Ok((material, options))
+    }
+
+    /// The normals of `norm`, or of `map_Bump`, where many programs write them; heights are left out, and so is
+    /// what cannot be read.
+    fn relief(
+        &mut self,
+        source: &mut Source,
+        element: &str,
+        m: &tobj::Material,
+        textures: &mut Vec<Arc<Texture>>,
+        others: Option<MapOptions>,
+    ) -> (Option<Relief>, MapOptions) {
+        let normals = m.unknown_param.get("norm").map(|n| (n, true));
+        let named = normals.or(m.normal_texture.as_ref().map(|n| (n, false)));
+        let plain = others.unwrap_or_default();
+        let Some((text, sure)) = named else { return (None, plain) };
+        let (options, name) = MapOptions::parse(text);
+        if others.is_some_and(|o| (o.scale, o.offset) != (options.scale, options.offset)) {
+            source.warn(format!("{element}: its bumps are laid on in another way: left out"));
+            return (None, plain);
+        }
+        let key = (Some(name.to_string()), None, options.wrap == Wrap::Clamp);
+        let texture = match self.textures.get(&key) {
+            Some(&known) if sure || holds_normals(&textures[known as usize]) => known,
+            Some(_) => return (None, plain),
+            None => match self.texture(source, element, (key.0.clone(), None), options.wrap) {
+                Ok(texture) if sure || holds_normals(&texture) => {
+                    textures.push(Arc::new(texture));
+                    let index = textures.len() as u32 - 1;
+                    self.textures.insert(key, index);
+                    index
+                }
+                Ok(_) => return (None, plain),
+                Err(e) => {
+                    source.warn(format!("{element}: its bumps are left out: {e}"));
+                    return (None, plain);
+                }
+            },
+        };
+        (Some(Relief { texture, scale: options.bumps }), others.unwrap_or(options))
     }
 
     /// Colour of one image, alpha of the other.

@@ -87,6 +87,8 @@ pub struct MaterialHeader {
     pub base_color: [f32; 4],
     /// Number of the texture.
     pub texture: Option<u32>,
+    /// Number of the normal texture, and what multiplies its x and y.
+    pub relief: Option<(u32, f32)>,
     /// 0 opaque, 1 mask, 2 blend.
     pub alpha_mode: u8,
     /// Cutoff of the mask mode; 0 in the others.

@@ -1,7 +1,7 @@
 //! Foliage is drawn as the CPU draws it, and bends in the wind; all representations lean alike; fades
 //! share the samples.
 
-use super::{Device, SIDE, assert_same, cameras, thresholds, tree};
+use super::{Device, SIDE, assert_same, cameras, thresholds, tree, with_bumps};
 use forest_draw::{
     FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
 };
@@ -23,8 +23,11 @@ fn foliage_is_drawn_as_the_cpu_draws_it() {
     let device = Device::new(Options::default());
     let mut soup = tree("broadleaf_young.gltf");
     for blocks in [true, false] {
-        // And leaves and wood that let less light through than the light says.
+        // And leaves and wood that let less light through than the light says, and wood with bumps.
         let share = if blocks { 1.0 } else { 0.3 };
+        if !blocks {
+            with_bumps(&mut soup);
+        }
         soup.materials.iter_mut().for_each(|m| m.translucency = share);
         let options = FoliageOptions { blocks, ..FoliageOptions::default() };
         let pack = open(&bake_foliage(&soup, &options).unwrap().0).unwrap();
@@ -52,6 +55,7 @@ fn bent_points_are_those_of_draw() {
     let device = Device::new(Options::default());
     let mut soup = tree("broadleaf_young.gltf");
     soup.materials.iter_mut().for_each(|m| m.translucency = 0.3);
+    with_bumps(&mut soup);
     let pack = open(&merged(&[
         bake_foliage(&soup, &FoliageOptions::default()).unwrap().0,
         bake_bytes(&soup, &BakeOptions::default()).unwrap().0,

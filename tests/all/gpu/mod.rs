@@ -11,7 +11,7 @@ use forest_gpu::{Drawn, Frame, Gpu, Layer, Model, Options, Renderer, instance, r
 use forest_import::{Block, Limits};
 use forest_points::{PixelArea, Thresholds};
 use forest_raster::{Light, Picture, Sun};
-use forest_soup::{Camera, Projection, TriangleSoup};
+use forest_soup::{AlphaMode, Camera, Material, Projection, Relief, Texture, TriangleSoup, Wrap};
 use forest_tests::pictures::rmse;
 use glam::DVec3;
 
@@ -61,6 +61,24 @@ fn tree(name: &str) -> TriangleSoup {
     let path = repo("sample-data").join(name).display().to_string();
     let block = Block::parse(&[path]).unwrap();
     block.load(&Limits::default()).unwrap().model.flatten(1 << 24).unwrap()
+}
+
+/// Gives the wood of a tree bumps that slope by up to a half.
+fn with_bumps(soup: &mut TriangleSoup) {
+    let texel = |i: u32| {
+        let wave = |t: u32, turns: f64| (f64::from(t) * turns * std::f64::consts::TAU / 32.0).sin();
+        let n = DVec3::new(0.5 * wave(i % 32, 3.0), 0.5 * wave(i / 32, 2.0), 1.0).normalize();
+        let [x, y, z] = (127.5 + n * 127.5).to_array().map(|v| v.round() as u8);
+        [x, y, z, 255]
+    };
+    let texels = (0..32 * 32).map(texel).collect();
+    let name = "bumps".into();
+    soup.textures
+        .push(Texture { name, width: 32, height: 32, texels, wrap: [Wrap::Repeat; 2] }.into());
+    let texture = soup.textures.len() as u32 - 1;
+    let opaque = |m: &&mut Material| m.alpha_mode == AlphaMode::Opaque;
+    let relief = Some(Relief { texture, scale: 0.8 });
+    soup.materials.iter_mut().filter(opaque).for_each(|m| m.relief = relief);
 }
 
 /// From afar and level, from the side and near, from above, and from within the crown.

@@ -129,6 +129,10 @@ fn srgb_to_linear(c: vec3f) -> vec3f {
     return select(pow((c + 0.055) / 1.055, vec3f(2.4)), c / 12.92, c <= vec3f(0.04045));
 }
 
+fn linear_to_srgb(c: vec3f) -> vec3f {
+    return select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, c * 12.92, c <= vec3f(0.0031308));
+}
+
 // Factors on a base colour: forest_raster::Sun. The normal faces the eye.
 fn light(normal: vec3f, sunlit: f32, skylit: f32) -> vec3f {
     return light_through(1.0, normal, sunlit, skylit);

@@ -177,6 +177,7 @@ fn shadow_fragment(in: Corner) -> @location(0) vec4f {
 
 @fragment
 fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let steps = Steps(dpdx(in.place), dpdy(in.place), dpdx(in.uv), dpdy(in.uv));
     let surface = surface_of(in);
     if !is_covered_by(in, surface.color.a) || !fades_in(foliage.fade, vec2u(in.position.xy)) {
         discard;
@@ -191,6 +192,7 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
         let direct = scattered(dot(to_eye(in.place), frame.to_sun), surface.through * frame.translucency);
         return vec4f(rgb * (frame.sun * (direct * foliage.sunlit * sunlit) + frame.sky * in.skylit), 1.0);
     }
-    let normal = normalize(select(-in.normal, in.normal, front));
+    let smooth_normal = normalize(select(-in.normal, in.normal, front));
+    let normal = bumpy(materials[in.what.y], smooth_normal, front, in.uv, steps);
     return vec4f(rgb * light_through(surface.through, normal, sunlit, in.skylit), 1.0);
 }

@@ -11,6 +11,9 @@ struct Material {
     flags: u32,
     // Number of the texture; all ones for none.
     image: u32,
+    // The same of the normal texture, and what multiplies its x and y.
+    relief: u32,
+    relief_scale: f32,
 }
 
 // Share of the light's translucency.
@@ -60,6 +63,52 @@ fn sampled(image: Image, uv: vec2f, opaque: bool) -> vec4f {
     let top = mix(texel(image, i, opaque), texel(image, i + vec2i(1, 0), opaque), f.x);
     let bottom = mix(texel(image, i + vec2i(0, 1), opaque), texel(image, i + 1, opaque), f.x);
     return mix(top, bottom, f.y);
+}
+
+// A normal of a texture in its own frame: forest_soup::NormalMap. The sheet decodes what it takes for sRGB.
+fn bump_at(m: Material, uv: vec2f) -> vec3f {
+    let image = images[m.relief];
+    let at = uv * vec2f(image.size) - 0.5;
+    let low = floor(at);
+    let f = at - low;
+    let i = vec2i(clamp(low, vec2f(-1e9), vec2f(1e9)));
+    let top = mix(number(image, i), number(image, i + vec2i(1, 0)), f.x);
+    let bottom = mix(number(image, i + vec2i(0, 1)), number(image, i + 1), f.x);
+    let bump = (2.0 * mix(top, bottom, f.y) - 1.0) * vec3f(vec2f(m.relief_scale), 1.0);
+    let length = length(bump);
+    return select(vec3f(0.0, 0.0, 1.0), bump / length, length > 0.0);
+}
+
+// A texel of numbers.
+fn number(image: Image, at: vec2i) -> vec3f {
+    return linear_to_srgb(texel(image, at, true).rgb);
+}
+
+// How a place and its texture coordinates change from pixel to pixel.
+struct Steps {
+    right: vec3f,
+    down: vec3f,
+    uv_right: vec2f,
+    uv_down: vec2f,
+}
+
+// The unit normal of a triangle that faces the eye, with the bumps of its material: forest_soup::Tangents.
+fn bumpy(m: Material, normal: vec3f, front: bool, uv: vec2f, steps: Steps) -> vec3f {
+    if m.relief == 0xffffffffu {
+        return normal;
+    }
+    let area = steps.uv_right.x * steps.uv_down.y - steps.uv_right.y * steps.uv_down.x;
+    let along_u = (steps.right * steps.uv_down.y - steps.down * steps.uv_right.y) * sign(area);
+    let along_v = (steps.down * steps.uv_right.x - steps.right * steps.uv_down.x) * sign(area);
+    let off = along_u - normal * dot(normal, along_u);
+    if !(dot(off, off) > 0.0) {
+        return normal;
+    }
+    let u = normalize(off);
+    let across = cross(normal, u);
+    let up = select(across, -across, dot(across, along_v) > 0.0);
+    let bump = bump_at(m, uv);
+    return normalize((u * bump.x + up * bump.y) * select(-1.0, 1.0, front) + normal * bump.z);
 }
 
 // Linear RGB of a material, and its coverage: forest_soup::Material::coverage.

@@ -15,6 +15,8 @@ struct Corner {
     @location(3) seen: vec2f,
     // Number of the triangle, material, and cell.
     @location(4) @interpolate(flat) what: vec3u,
+    // From the eye.
+    @location(5) place: vec3f,
 }
 
 // Half a word of a triangle record.
@@ -52,6 +54,7 @@ fn corner(index: u32, cell_index: u32) -> Corner {
         let c = unpack4x8unorm(colors[index]);
         out.tint = vec4f(srgb_to_linear(c.rgb), c.a);
     }
+    out.place = place;
     out.seen = seen_at(place) * exp(-cell.clump);
     out.what = vec3u(triangle, material, cell_index);
     return out;
@@ -59,6 +62,7 @@ fn corner(index: u32, cell_index: u32) -> Corner {
 
 @fragment
 fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let steps = Steps(dpdx(in.place), dpdy(in.place), dpdx(in.uv), dpdy(in.uv));
     let m = materials[in.what.y];
     let at = vec2u(in.position.xy);
     let seen = surface_at(m, in.uv, in.tint);
@@ -72,6 +76,7 @@ fn fragment(in: Corner, @builtin(front_facing) front: bool) -> @location(0) vec4
     if (m.flags & 1u) != 0u {
         return vec4f(seen.rgb, 1.0);
     }
-    let normal = normalize(select(-in.normal, in.normal, front));
+    let smooth_normal = normalize(select(-in.normal, in.normal, front));
+    let normal = bumpy(m, smooth_normal, front, in.uv, steps);
     return vec4f(seen.rgb * light_through(translucency_of(m), normal, in.seen.x, in.seen.y * skyward(normal)), 1.0);
 }

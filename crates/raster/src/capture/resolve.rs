@@ -5,6 +5,7 @@ use super::fill::{Planes, Vertex};
 use super::prepare::Prepared;
 use super::{Buffers, Capture, CaptureScene, Grid};
 use crate::picture::Picture;
+use forest_soup::Tangents;
 use glam::Vec3;
 
 /// What a sample adds to its pixel.
@@ -114,9 +115,19 @@ impl CaptureScene<'_> {
         let [a, b, c] = corners.map(|v| self.uvs[v as usize]);
         let texels = t.texels / planes.samples() * part.count as f32;
         let uv = a * w[0] + b * w[1] + c * w[2];
+        let mut normal = if front { normal } else { -normal };
+        if let Some(map) = surface.relief()
+            && let Some(tangents) = Tangents::new(
+                self.soup.corners(t.id as usize),
+                corners.map(|v| self.uvs[v as usize]),
+            )
+        {
+            let own = texels * map.texels() / surface.texels();
+            normal = tangents.turn(normal, front, map.sample(uv, own));
+        }
         Shaded {
             rgb: surface.color(uv, texels, self.tint(t, w)),
-            normal: if front { normal } else { -normal },
+            normal,
             sky: self.skylight.as_ref().map_or(1.0, |s| s.at(i, front, w)),
         }
     }

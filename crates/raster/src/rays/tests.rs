@@ -1,7 +1,9 @@
 use super::*;
+use crate::{Buffers, CaptureScene, Subject};
 use crate::{Light, Sampling, Sun, rasterize};
-use forest_soup::{AlphaMode, Material, Projection};
+use forest_soup::{AlphaMode, Material, Projection, Relief, Texture, Wrap};
 use glam::DVec3;
+use std::sync::Arc;
 
 fn soup(triangles: &[[Vec3; 3]]) -> TriangleSoup {
     let n = triangles.len() as u32;
@@ -155,4 +157,109 @@ fn nothing_and_not_numbers_make_empty_pictures() {
         assert_eq!(rasterize(&nothing, &surfaces, &camera, &Style::default()), empty);
         assert_eq!(RayScene::new(&nothing, &surfaces).picture(&camera, &Style::default()), empty);
     }
+}
+
+/// Height of some hills at x, z in 0 … 1, and how it grows along both.
+fn hills(x: f64, z: f64) -> (f64, f64, f64) {
+    let (a, b) = (std::f64::consts::TAU * 2.0, std::f64::consts::TAU * 3.0);
+    let (p, q) = (a * x + 0.4, b * z + 1.1 * (a * x).sin());
+    let high = 0.02;
+    let along_z = high * 0.6 * b * q.cos();
+    let along_x = high * a * p.cos() + high * 0.6 * q.cos() * 1.1 * a * (a * x).cos();
+    (high * (p.sin() + 0.6 * q.sin()), along_x, along_z)
+}
+
+/// A square whose bumps are those of `hills`; u grows along x, and v along z or against it.
+fn bumpy(mirrored: bool) -> TriangleSoup {
+    let side = 256;
+    let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
+    let texel = |i: u32| {
+        let (x, v) = (middle(i % side), middle(i / side));
+        let (_, along_x, along_z) = hills(x, if mirrored { 1.0 - v } else { v });
+        // Up the picture is against v.
+        let along_up = if mirrored { along_z } else { -along_z };
+        let n = DVec3::new(-along_x, -along_up, 1.0).normalize();
+        let [x, y, z] = (127.5 + n * 127.5).round().to_array().map(|v| v as u8);
+        [x, y, z, 255]
+    };
+    let texture = Texture {
+        name: "hills".into(),
+        width: side,
+        height: side,
+        texels: (0..side * side).map(texel).collect(),
+        wrap: [Wrap::Repeat; 2],
+    };
+    let corner = |x: f32, z: f32| Vec3::new(x - 0.5, 0.0, z - 0.5);
+    let [a, b, c, d] = [corner(0., 0.), corner(1., 0.), corner(1., 1.), corner(0., 1.)];
+    // Its front is above.
+    let mut square = soup(&[[a, c, b], [a, d, c]]);
+    let uv = |p: &Vec3| Vec2::new(p.x + 0.5, if mirrored { 0.5 - p.z } else { p.z + 0.5 });
+    square.uvs = square.positions.iter().map(uv).collect();
+    square.normals = vec![Vec3::Y; square.positions.len()];
+    square.materials[0].relief = Some(Relief { texture: 0, scale: 1.0 });
+    square.textures = vec![Arc::new(texture)];
+    square
+}
+
+/// The hills themselves.
+fn hilly() -> TriangleSoup {
+    let n = 256;
+    let place = |i: u32, j: u32| {
+        let [x, z] = [i, j].map(|i| f64::from(i) / f64::from(n));
+        DVec3::new(x - 0.5, hills(x, z).0, z - 0.5).as_vec3()
+    };
+    let cell = |k: u32| {
+        let (i, j) = (k % n, k / n);
+        let [a, b, c, d] = [place(i, j), place(i + 1, j), place(i + 1, j + 1), place(i, j + 1)];
+        [[a, c, b], [a, d, c]]
+    };
+    soup((0..n * n).map(cell).collect::<Vec<_>>().as_flattened())
+}
+
+/// Normal textures are lit as the shapes they were made of, from both sides, however they are laid on: by rays
+/// and by scanlines; and captures keep their normals.
+#[test]
+fn bumps_are_lit_as_the_hills_they_stand_for() {
+    let hilly = hilly();
+    let surfaces = Surfaces::new(&hilly.materials, &[]);
+    let hills = RayScene::new(&hilly, &surfaces);
+    for mirrored in [false, true] {
+        let bumpy = bumpy(mirrored);
+        let surfaces = Surfaces::new(&bumpy.materials, &bumpy.textures);
+        let square = RayScene::new(&bumpy, &surfaces);
+        for (up, to_sun) in [
+            (1.0, DVec3::new(0.7, 1.0, 0.0)),
+            (1.0, DVec3::new(0.0, 1.0, 0.7)),
+            (-1.0, DVec3::new(0.5, -1.0, 0.6)),
+        ] {
+            let projection = Projection::Orthographic { height: 0.9 };
+            let eye = DVec3::new(0.0, 5.0 * up, 0.0);
+            let camera = Camera::new(eye, DVec3::NEG_Y * up, projection, [48; 2]);
+            let style =
+                Style { sampling: Sampling { side: 4, seed: 1 }, ..lit(to_sun, 1.0, 0.0, 0.0) };
+            let want = hills.picture(&camera, &style);
+            let level = to_sun.normalize().y * up;
+            let spread = rms(&want, |_| level);
+            assert!(spread > 0.08, "the sun shows the hills: {spread}");
+            let pictures = [
+                ("rays", square.picture(&camera, &style)),
+                ("lines", rasterize(&bumpy, &surfaces, &camera, &style)),
+            ];
+            for (how, got) in pictures {
+                let off = rms(&want, |p| f64::from(got.pixels[p][0]));
+                assert!(off < 0.1 * spread, "{how}, {mirrored}, {to_sun}: {off} of {spread}");
+            }
+            let capture = CaptureScene::new(&bumpy, &surfaces);
+            let got = capture.capture(&camera, 4, &mut Buffers::default()).picture;
+            let toward = to_sun.normalize().as_vec3();
+            let off = rms(&want, |p| f64::from(Vec3::from(got.normal[p]).dot(toward)));
+            assert!(off < 0.1 * spread, "captured, {mirrored}, {to_sun}: {off} of {spread}");
+        }
+    }
+}
+
+fn rms(picture: &Picture, other: impl Fn(usize) -> f64) -> f64 {
+    let square = |(i, p): (usize, &[f32; 4])| (f64::from(p[0]) - other(i)).powi(2);
+    let sum: f64 = picture.pixels.iter().enumerate().map(square).sum();
+    (sum / picture.pixels.len() as f64).sqrt()
 }

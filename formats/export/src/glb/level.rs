@@ -133,6 +133,10 @@ impl<'a> Levels<'a> {
         let opaque = material.alpha_mode == AlphaMode::Opaque;
         let texture = material.texture.map(|t| self.texture(t, opaque, binary, out)).transpose()?;
         let new = out.material(&material, texture);
+        if let Some(relief) = material.relief {
+            let texture = self.texture(relief.texture, true, binary, out)?;
+            out.relief(new, texture, relief.scale);
+        }
         self.known[1].insert(number.into(), new);
         Ok(new)
     }

@@ -56,6 +56,12 @@ impl Materials {
         Ok(self.textures.len() - 1)
     }
 
+    /// Gives material `number` a normal texture.
+    pub(crate) fn relief(&mut self, number: usize, texture: usize, scale: f32) {
+        self.materials[number]["normalTexture"] =
+            json!({ "index": texture, "scale": f64::from(scale) });
+    }
+
     /// A matt material with the picture of that number; its own number.
     pub(crate) fn material(&mut self, material: &Material, texture: Option<usize>) -> usize {
         let mut matt = json!({

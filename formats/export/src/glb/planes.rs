@@ -85,7 +85,7 @@ impl<'a> Planes<'a> {
         let material = out.material(&material, Some(color));
         if self.block.header.channels.normal {
             let normal = out.texture(binary, &normal, true)?;
-            out.materials[material]["normalTexture"] = json!({ "index": normal });
+            out.relief(material, normal, 1.0);
         }
         let attributes = json!({
             "POSITION": binary.positions(&positions),

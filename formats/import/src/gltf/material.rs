@@ -4,12 +4,14 @@ use super::buffers::Buffers;
 use super::missing;
 use crate::source::Source;
 use crate::{ImportError, picture};
-use forest_soup::{AlphaMode, Material, Texture, Wrap};
+use forest_soup::{AlphaMode, Material, Relief, Texture, Wrap};
+use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{Info, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Root, material::AlphaMode as JsonAlphaMode};
 use serde_json::Value;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 /// How a material's texture is laid on: the set of coordinates, and the affine map of
@@ -20,33 +22,59 @@ pub(crate) struct Look {
     pub(crate) transform: [[f64; 3]; 2],
 }
 
-/// The textures that base colours use.
+/// The textures that materials use.
+#[derive(Default)]
 pub(crate) struct Textures {
     pub(crate) list: Vec<Arc<Texture>>,
     /// From glTF texture to `list`.
     pub(crate) of: HashMap<usize, u32>,
+    decoded: HashMap<(usize, [Wrap; 2]), u32>,
+    images: HashMap<usize, (String, image::DynamicImage)>,
 }
 
-/// Decodes the images of all base colour textures, each once for each way of wrapping it.
+/// Decodes the images of all textures that are used, each once for each way of wrapping it.
 pub(crate) fn textures(
     source: &mut Source,
     root: &Root,
     buffers: &Buffers,
 ) -> Result<Textures, ImportError> {
-    let mut textures = Textures { list: Vec::new(), of: HashMap::new() };
-    let mut decoded: HashMap<(usize, [Wrap; 2]), u32> = HashMap::new();
-    let mut images = HashMap::new();
-    for i in 0..root.materials.len() {
-        let Some(index) = base_color(source, root, i)?.texture.map(|t| t.index) else { continue };
-        if textures.of.contains_key(&index) {
-            continue;
+    let mut textures = Textures::default();
+    for (i, m) in root.materials.iter().enumerate() {
+        let user = format!("material {i}");
+        if let Some(t) = base_color(source, root, i)?.texture {
+            textures.decode(source, root, buffers, &user, t.index)?;
+        }
+        let Some(normal) = &m.normal_texture else { continue };
+        match textures.decode(source, root, buffers, &user, normal.index.value()) {
+            // A tree without its bumps is still that tree.
+            Err(ImportError::Unsupported { what, .. }) => {
+                source.warn(format!("{user}: its normal texture needs {what}: left out"));
+            }
+            other => other?,
+        }
+    }
+    Ok(textures)
+}
+
+impl Textures {
+    /// Decodes glTF texture `index`, which `user` names.
+    fn decode(
+        &mut self,
+        source: &mut Source,
+        root: &Root,
+        buffers: &Buffers,
+        user: &str,
+        index: usize,
+    ) -> Result<(), ImportError> {
+        if self.of.contains_key(&index) {
+            return Ok(());
         }
         let element = format!("texture {index}");
         let count = root.textures.len();
         let texture = root
             .textures
             .get(index)
-            .ok_or_else(|| missing(source, &format!("material {i}"), "texture", index, count))?;
+            .ok_or_else(|| missing(source, user, "texture", index, count))?;
         let others = texture.extensions.as_ref().map(|e| &e.others);
         let webp =
             others.and_then(|o| o.get("EXT_texture_webp")).and_then(|e| e["source"].as_u64());
@@ -60,22 +88,22 @@ pub(crate) fn textures(
             i => i,
         };
         let wrap = wrap(source, root, &element, texture.sampler.map(|s| s.value()))?;
-        let slot = match decoded.get(&(image, wrap)) {
+        let slot = match self.decoded.get(&(image, wrap)) {
             Some(&slot) => slot,
             None => {
-                if let std::collections::hash_map::Entry::Vacant(e) = images.entry(image) {
+                if let Entry::Vacant(e) = self.images.entry(image) {
                     e.insert(decode_image(source, root, buffers, image)?);
                 }
-                let (name, picture) = &images[&image];
-                textures.list.push(Arc::new(picture::texture(name.clone(), picture, wrap)));
-                let slot = textures.list.len() as u32 - 1;
-                decoded.insert((image, wrap), slot);
+                let (name, picture) = &self.images[&image];
+                self.list.push(Arc::new(picture::texture(name.clone(), picture, wrap)));
+                let slot = self.list.len() as u32 - 1;
+                self.decoded.insert((image, wrap), slot);
                 slot
             }
         };
-        textures.of.insert(index, slot);
+        self.of.insert(index, slot);
+        Ok(())
     }
-    Ok(textures)
 }
 
 fn decode_image(
@@ -147,29 +175,33 @@ fn base_color(source: &Source, root: &Root, i: usize) -> Result<BaseColor, Impor
         let factor = gloss.get("diffuseFactor").cloned().map(serde_json::from_value).transpose();
         let info = gloss.get("diffuseTexture").cloned().map(serde_json::from_value::<Info>);
         let info = info.transpose().map_err(fail)?;
-        let texture = info.map(|t| BaseTexture { index: t.index.value(), look: look(&t) });
+        let texture = info.map(|t| BaseTexture { index: t.index.value(), look: of_info(&t) });
         return Ok(BaseColor { factor: factor.map_err(fail)?.unwrap_or([1.0; 4]), texture });
     }
     let pbr = &m.pbr_metallic_roughness;
     let texture = pbr.base_color_texture.as_ref();
     Ok(BaseColor {
         factor: pbr.base_color_factor.0,
-        texture: texture.map(|t| BaseTexture { index: t.index.value(), look: look(t) }),
+        texture: texture.map(|t| BaseTexture { index: t.index.value(), look: of_info(t) }),
     })
+}
+
+fn of_info(info: &Info) -> Look {
+    let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+    look(info.tex_coord, transform)
 }
 
 /// KHR_texture_transform: uv′ = translation · rotation · scale · uv, rotation counter-clockwise in
 /// a space whose v points down.
-fn look(info: &Info) -> Look {
-    let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+fn look(uv_set: u32, transform: Option<&TextureTransform>) -> Look {
     let Some(t) = transform else {
-        return Look { uv_set: info.tex_coord, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+        return Look { uv_set, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
     };
     let [sx, sy] = t.scale.0.map(f64::from);
     let [ox, oy] = t.offset.0.map(f64::from);
     let (sin, cos) = f64::from(t.rotation.0).sin_cos();
     Look {
-        uv_set: t.tex_coord.unwrap_or(info.tex_coord),
+        uv_set: t.tex_coord.unwrap_or(uv_set),
         transform: [[cos * sx, sin * sy, ox], [-sin * sx, cos * sy, oy]],
     }
 }
@@ -193,9 +225,33 @@ fn translucency(source: &Source, m: &gltf::json::Material, i: usize) -> Result<f
     }
 }
 
-/// Material `i` and how its texture is laid on.
-pub(crate) fn material(
+/// The normal texture of material `i`, and how it is laid on.
+fn relief(
     source: &Source,
+    m: &gltf::json::Material,
+    i: usize,
+    textures: &HashMap<usize, u32>,
+) -> Result<Option<(Relief, Look)>, ImportError> {
+    let Some(normal) = &m.normal_texture else { return Ok(None) };
+    // It was left out.
+    let Some(&texture) = textures.get(&normal.index.value()) else { return Ok(None) };
+    if !normal.scale.is_finite() {
+        let problem = format!("normalTexture scale {}", normal.scale);
+        return Err(source.invalid(format!("material {i}"), problem));
+    }
+    let fail = |e: serde_json::Error| {
+        source.invalid(format!("material {i}"), format!("normalTexture transform: {e}"))
+    };
+    let transform = normal.extensions.as_ref().and_then(|e| e.others.get("KHR_texture_transform"));
+    let transform: Option<TextureTransform> =
+        transform.cloned().map(serde_json::from_value).transpose().map_err(fail)?;
+    let look = look(normal.tex_coord, transform.as_ref());
+    Ok(Some((Relief { texture, scale: normal.scale }, look)))
+}
+
+/// Material `i` and how its textures are laid on.
+pub(crate) fn material(
+    source: &mut Source,
     root: &Root,
     i: usize,
     textures: &HashMap<usize, u32>,
@@ -216,11 +272,22 @@ pub(crate) fn material(
             return Err(source.invalid(format!("material {i}"), "unknown alpha mode"));
         }
     };
+    let look = base.texture.as_ref().map(|t| t.look);
+    let relief = match (relief(source, m, i, textures)?, look) {
+        (Some((_, own)), Some(look)) if own != look => {
+            source.warn(format!(
+                "material {i}: its normal texture has other coordinates than its colour: left out"
+            ));
+            None
+        }
+        (relief, _) => relief,
+    };
     let extensions = m.extensions.as_ref();
     let material = Material {
         name: m.name.clone().unwrap_or_default(),
         base_color: base.factor,
         texture: base.texture.as_ref().map(|t| textures[&t.index]),
+        relief: relief.map(|r| r.0),
         alpha_mode,
         double_sided: m.double_sided,
         unlit: extensions.is_some_and(|e| {
@@ -229,5 +296,5 @@ pub(crate) fn material(
         translucency: translucency(source, m, i)?,
         scattered: false,
     };
-    Ok((material, base.texture.map(|t| t.look)))
+    Ok((material, look.or(relief.map(|r| r.1))))
 }

@@ -1,6 +1,6 @@
-use crate::{ImportError, Limits, load};
+use crate::{ImportError, Imported, Limits, load};
 use base64::Engine;
-use forest_soup::{AlphaMode, Model, Wrap};
+use forest_soup::{AlphaMode, Model, Relief, Wrap};
 use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -76,7 +76,11 @@ impl Doc {
         self.accessor(&bytes, 5126, values.len() / width, kind)
     }
 
-    fn load(mut self) -> Result<Model, ImportError> {
+    fn load(self) -> Result<Model, ImportError> {
+        self.read().map(|i| i.model)
+    }
+
+    fn read(mut self) -> Result<Imported, ImportError> {
         let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
         self.json["buffers"][0]["byteLength"] = json!(self.bytes.len());
         self.json["buffers"][0]["uri"] =
@@ -84,7 +88,7 @@ impl Doc {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("t.gltf");
         std::fs::write(&path, self.json.to_string()).unwrap();
-        load(&path, &Limits::default()).map(|i| i.model)
+        load(&path, &Limits::default())
     }
 
     fn refused(self, want: &[&str]) -> ImportError {
@@ -283,6 +287,43 @@ fn texture_transforms_samplers_and_second_uv_sets() {
     for (got, want) in model.meshes[0].uvs.iter().zip(want) {
         assert!((*got - want).length() < 1e-6, "{got} {want}");
     }
+}
+
+#[test]
+fn normal_textures_are_read_where_they_lie_as_the_colour() {
+    let transform = json!({ "KHR_texture_transform": { "scale": [1.0, 0.1] } });
+    let other = json!({ "KHR_texture_transform": { "scale": [1.0, 0.2] } });
+    for (own, kept) in [(transform.clone(), true), (other, false)] {
+        let mut doc = Doc::triangle();
+        textured(&mut doc, &encoded(image::ImageFormat::Png), "image/png");
+        doc.json["textures"] = json!([{ "source": 0 }, { "source": 0 }]);
+        let m = &mut doc.json["materials"][0];
+        m["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = transform.clone();
+        m["normalTexture"] = json!({ "index": 1, "scale": 0.5, "extensions": own });
+        let read = doc.read().unwrap();
+        let relief = read.model.materials[0].relief;
+        assert_eq!(relief, kept.then_some(Relief { texture: 0, scale: 0.5 }));
+        assert_eq!(read.warnings.len(), usize::from(!kept), "{:?}", read.warnings);
+    }
+    // Alone it says how it lies; what cannot be read is left out, and told.
+    let alone = || {
+        let mut doc = Doc::triangle();
+        textured(&mut doc, &encoded(image::ImageFormat::Png), "image/png");
+        doc.json["materials"] =
+            json!([{ "normalTexture": { "index": 0, "extensions": transform } }]);
+        doc
+    };
+    let model = alone().load().unwrap();
+    assert_eq!(model.materials[0].relief, Some(Relief { texture: 0, scale: 1.0 }));
+    assert!((model.meshes[0].uvs[2].y - 0.1).abs() < 1e-7);
+    let mut doc = alone();
+    doc.json["textures"] = json!([{ "extensions": { "KHR_texture_basisu": { "source": 0 } } }]);
+    let read = doc.read().unwrap();
+    assert_eq!(read.model.materials[0].relief, None);
+    assert!(read.warnings[0].contains("KHR_texture_basisu"), "{:?}", read.warnings);
+    let mut doc = alone();
+    doc.json["materials"][0]["normalTexture"]["index"] = json!(7);
+    doc.refused(&["material 0", "texture 7 of 1"]);
 }
 
 #[test]

@@ -134,6 +134,39 @@ newmtl solid\nKd 1 0 0\nd 1.0\n",
 }
 
 #[test]
+fn bumps_are_normals_not_heights() {
+    let dir = tempfile::tempdir().unwrap();
+    png(dir.path(), "normals.png", 2, |x, _| [100 + 56 * x as u8, 128, 240, 255]);
+    png(dir.path(), "heights.png", 2, |x, _| [[90; 4], [200; 4]][x as usize]);
+    write(
+        dir.path(),
+        "t.mtl",
+        "newmtl a\nmap_Kd heights.png\nmap_Bump -bm 0.5 normals.png\n\
+         newmtl b\nbump heights.png\nnewmtl c\nnorm heights.png\n\
+         newmtl d\nmap_Kd -s 2 2 heights.png\nnorm normals.png\nnewmtl e\nnorm gone.png\n",
+    );
+    let mut obj = String::from("mtllib t.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n");
+    for m in ["a", "b", "c", "d", "e"] {
+        obj.push_str(&format!("usemtl {m}\nf 1/1 2/2 3/3\n"));
+    }
+    write(dir.path(), "t.obj", &obj);
+    let read = load_file(&dir.path().join("t.obj"), &Limits::default()).unwrap();
+    let [a, b, c, d, e] = &read.model.materials[..] else { panic!() };
+    let relief = a.relief.unwrap();
+    assert_eq!(
+        (relief.scale, read.model.textures[relief.texture as usize].texels[1][0]),
+        (0.5, 156)
+    );
+    assert!(
+        b.relief.is_none() && c.relief.is_some(),
+        "heights, unless they are said to be normals"
+    );
+    assert!(d.relief.is_none() && e.relief.is_none());
+    let told = read.warnings.join("\n");
+    assert!(told.contains("material d") && told.contains("gone.png"), "{told}");
+}
+
+#[test]
 fn map_options_are_not_part_of_the_name() {
     let parse = MapOptions::parse;
     let (o, name) = parse("-s 2 3 1 -o 0.5 0.25 -bm 0.2 -clamp on leaf card.png");
