@@ -103,11 +103,14 @@ fn smooth(mesh: &mut Mesh) {
 }
 
 /// As few triangles of `source` as `tolerance` (world units) lets there be, but not fewer than
-/// `target`: by meshoptimizer, material by material.
+/// `target`: by meshoptimizer, material by material. A picture that slips by a length counts as a surface that
+/// moves by it: else straight trunks, whose shape needs few triangles, show stretched bark.
 fn simplified(source: &Mesh, target: usize, tolerance: f32) -> Mesh {
     let positions: Vec<Vec3> = source.vertices.iter().map(|v| v.position.as_vec3()).collect();
     let bytes: &[u8] = bytemuck::cast_slice(&positions);
     let vertices = meshopt::VertexDataAdapter::new(bytes, 12, 0).expect("12 bytes a position");
+    let uvs: Vec<[f32; 2]> = source.vertices.iter().map(|v| v.uv.as_vec2().to_array()).collect();
+    let locks = vec![false; source.vertices.len()];
     let share = target as f64 / source.triangles.len() as f64;
     let mut materials: Vec<u16> = source.triangles.iter().map(|t| t.1).collect();
     materials.sort_unstable();
@@ -117,9 +120,21 @@ fn simplified(source: &Mesh, target: usize, tolerance: f32) -> Mesh {
     for material in materials {
         let own = source.triangles.iter().filter(|t| t.1 == material);
         let indices: Vec<u32> = own.flat_map(|t| t.0).collect();
+        let weights = uv_weights(source, &indices);
         let most = (indices.len() as f64 / 3.0 * share).floor() as usize * 3;
         let options = meshopt::SimplifyOptions::Prune | meshopt::SimplifyOptions::ErrorAbsolute;
-        let kept = meshopt::simplify(&indices, &vertices, most, tolerance, options, None);
+        let kept = meshopt::simplify_with_attributes_and_locks(
+            &indices,
+            &vertices,
+            uvs.as_flattened(),
+            &weights,
+            size_of::<[f32; 2]>(),
+            &locks,
+            most,
+            tolerance,
+            options,
+            None,
+        );
         for t in kept.as_chunks::<3>().0 {
             let t = t.map(|v| {
                 *numbers.entry(v).or_insert_with(|| {
@@ -131,6 +146,25 @@ fn simplified(source: &Mesh, target: usize, tolerance: f32) -> Mesh {
         }
     }
     out
+}
+
+/// What the library is to multiply u and v by. Its error is that of a weighted step times the length of the edges
+/// over which it is made; that a picture slips by a length is to be an error of that length: what a step of u or
+/// v is in space, over the size of triangles (both means over the area of triangles, corners in threes).
+fn uv_weights(source: &Mesh, indices: &[u32]) -> [f32; 2] {
+    let (mut steps, mut sizes) = (DVec2::ZERO, 0.0);
+    for t in indices.as_chunks::<3>().0 {
+        let [a, b, c] = t.map(|v| &source.vertices[v as usize]);
+        let [p, q] = [b, c].map(|v| v.position - a.position);
+        let [s, t] = [b, c].map(|v| v.uv - a.uv);
+        let (area, of_picture) = (p.cross(q).length(), s.perp_dot(t));
+        if area > 0.0 && of_picture != 0.0 {
+            let [u, v] = [p * t.y - q * s.y, q * s.x - p * t.x].map(|d| d / of_picture);
+            steps += DVec2::new(u.length(), v.length()) * area;
+            sizes += area.sqrt() * area;
+        }
+    }
+    (steps / sizes).to_array().map(|w| if w.is_finite() { w as f32 } else { 0.0 })
 }
 
 /// What meshes are compared with.
@@ -218,4 +252,57 @@ fn points(mesh: &Mesh) -> Vec<DVec3> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A straight trunk of `rings` rings whose picture lies between two of them, upright and turned over in turns.
+    fn trunk(rings: u32) -> Mesh {
+        let sides = 16;
+        let mut mesh = Mesh::default();
+        for ring in 0..=rings {
+            for side in 0..=sides {
+                let turn = std::f64::consts::TAU * f64::from(side % sides) / f64::from(sides);
+                let out = DVec3::new(turn.cos(), 0.0, turn.sin());
+                mesh.vertices.push(Vertex {
+                    position: out + DVec3::Y * f64::from(ring),
+                    normal: out,
+                    uv: DVec2::new(f64::from(side) / f64::from(sides), f64::from(ring % 2)),
+                    color: [1.0; 4],
+                    on: OnBranch { branch: 0, at: f64::from(ring) },
+                    skylit: 1.0,
+                });
+            }
+        }
+        for ring in 0..rings {
+            for side in 0..sides {
+                let a = ring * (sides + 1) + side;
+                let [b, c, d] = [a + 1, a + sides + 1, a + sides + 2];
+                mesh.triangles.extend([([a, c, d], 0), ([a, d, b], 0)]);
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn simplified_trunks_do_not_stretch_their_bark() {
+        let whole = trunk(20);
+        let corners: Vec<u32> = whole.triangles.iter().flat_map(|t| t.0).collect();
+        let [u, v] = uv_weights(&whole, &corners);
+        let around = 32.0 * (std::f32::consts::PI / 16.0).sin();
+        assert!((u / v / around - 1.0).abs() < 1e-5, "a picture is as wide as the trunk is around");
+        let less = simplified(&whole, 0, 0.2);
+        assert!(less.triangles.len() < whole.triangles.len() * 7 / 10, "{}", less.triangles.len());
+        for (t, _) in &less.triangles {
+            let [a, b, c] = t.map(|v| &less.vertices[v as usize]);
+            let rise = |p: &Vertex, q: &Vertex| {
+                ((p.position.y - q.position.y).abs(), (p.uv.y - q.uv.y).abs())
+            };
+            for (high, picture) in [rise(a, b), rise(b, c), rise(c, a)] {
+                assert!(high < 1.5 && (high - picture).abs() < 0.5, "{picture} pictures on {high}");
+            }
+        }
+    }
 }
