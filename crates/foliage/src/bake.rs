@@ -6,6 +6,7 @@ use crate::crown::CrownLight;
 use crate::dictionary::{Layout, MOST_SIDE, atlas, encode};
 use crate::error::FoliageError;
 use crate::fit::Brightness;
+use crate::hang::Gale;
 use crate::header::{DICTIONARY, Draw, FoliageHeader, LevelHeader, VertexRecord};
 use crate::leaf::{Leaf, leaves};
 use crate::level::{CARD, Level, Placed, Tree};
@@ -93,7 +94,9 @@ pub fn bake(
     let looking = start.elapsed();
     let start = Instant::now();
     let surfaces = Surfaces::new(&soup.materials, &soup.textures);
-    let tree = Tree { soup, surfaces: &surfaces, wood: &wood, leaves: &leaves, visible: &visible };
+    let gale = Gale::new(&wood.rig.records);
+    let (surfaces, leaves) = (&surfaces, &leaves[..]);
+    let tree = Tree { soup, surfaces, wood: &wood, leaves, visible: &visible, gale: &gale };
     let levels: Vec<Level> = (0..options.levels)
         .map(|l| {
             let level = tree.level(finest * f64::from(l).exp2());

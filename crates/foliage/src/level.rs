@@ -1,7 +1,7 @@
 //! One level: thick branches, sheets of thin ones, cards of leaves.
 
 use crate::branch::OnBranch;
-use crate::hang::{Grown, holder, shares};
+use crate::hang::{Gale, Grown, mover, shares};
 use crate::header::WoodWay;
 use crate::leaf::{Card, Leaf, cards, clusters};
 use crate::mesh::Mesh;
@@ -23,6 +23,8 @@ pub(crate) struct Tree<'a> {
     pub(crate) leaves: &'a [Leaf],
     /// What is seen of the soup.
     pub(crate) visible: &'a Visible,
+    /// How its branches move.
+    pub(crate) gale: &'a Gale,
 }
 
 /// A panel in the tree.
@@ -185,7 +187,7 @@ impl Tree<'_> {
                 card.leaves.iter().map(|&i| all[i as usize].pivot * all[i as usize].area);
             let pivot = weighted.sum::<DVec3>() / area.max(f64::MIN_POSITIVE);
             let grown: Vec<Grown> = card.leaves.iter().map(|&i| all[i as usize].grown()).collect();
-            let on = holder(&self.wood.rig.records, &grown);
+            let on = mover(&self.wood.rig.records, self.gale, &grown);
             Some(self.placed(panel, on, &grown, Some(pivot)))
         });
         placed.collect()
