@@ -80,6 +80,10 @@ pub fn bake(
     let [wood, leaf] = [Part::Wood, Part::Leaf].map(|p| parts.triangles(p));
     let source = [wood.len() as u64, leaf.len() as u64];
     let wood = Wood::new(Welded::new(soup, wood, size), &bounds);
+    let (branches, limit) = (wood.rig.records.len(), usize::from(u16::MAX));
+    if branches > limit {
+        return Err(FoliageError::TooManyBranches { branches, limit });
+    }
     let mut leaves = leaves(&Welded::new(soup, leaf, size), CARD * finest);
     hang(soup, &wood, &mut leaves);
     // Pictures hold the leaves' area: before they are drawn, not after.
@@ -108,7 +112,7 @@ pub fn bake(
     let start = Instant::now();
     let panels: Vec<_> = levels.iter().flat_map(|l| &l.panels).map(|p| p.panel.clone()).collect();
     let layout = Layout::new(&panels)?;
-    let crown = crown(soup, &leaves);
+    let crown = crown(soup, leaves);
     let mut places = layout.places.iter().copied();
     let pivot_step = 2.0 * size / f64::from(i16::MAX);
     let mut arrays: Vec<Arrays> = levels
@@ -121,9 +125,9 @@ pub fn bake(
     let pictures = atlas(&panels, &layout);
     let lighting = start.elapsed();
     let start = Instant::now();
-    let translucency = translucency(soup, &leaves);
+    let translucency = translucency(soup, leaves);
     let dictionary = (layout.size, &pictures[0][..], translucency);
-    let crown_light = brighten(soup, &surfaces, &mut arrays, dictionary, pivot_step);
+    let crown_light = brighten(soup, surfaces, &mut arrays, dictionary, pivot_step);
     let lighting = (lighting, start.elapsed());
     let start = Instant::now();
     let mut branches = [0; 4];

@@ -3,7 +3,7 @@
 use crate::dictionary::{MIPS, decode};
 use crate::header::{DICTIONARY, Draw, FoliageHeader, LevelHeader, VertexRecord};
 use crate::validate::{is_material, validate, validate_header};
-use crate::wind::{BranchRecord, Pose, Wind};
+use crate::wind::{BranchRecord, FLUTTER, FLUTTER_FREQUENCY, Pose, Wind};
 use forest_pack::measures::{ErrorKind, Light, Need};
 use forest_pack::{Pack, PackError, SectionId, header, kind};
 use forest_points::read_materials;
@@ -249,10 +249,6 @@ pub struct Posed {
     eye: Vec3,
 }
 
-/// Largest angle by which leaves turn in a wind of strength 1, and how often a second.
-const FLUTTER: f32 = 0.35;
-const FLUTTER_HERTZ: f32 = 1.7;
-
 impl Posed {
     /// The tree of `block` in `wind`, seen from `eye` in the world; `phase` in turns tells trees of one
     /// kind apart.
@@ -269,7 +265,7 @@ impl Posed {
     /// By how much leaves turn at most, in radians, and where in their swing they are, in turns, before
     /// each leaf's own phase.
     pub fn flutter(&self) -> (f32, f32) {
-        let swing = self.wind.time * FLUTTER_HERTZ + self.phase;
+        let swing = self.wind.time * FLUTTER_FREQUENCY + self.phase;
         (FLUTTER * self.wind.strength, swing.fract())
     }
 

@@ -32,6 +32,16 @@ pub enum FoliageError {
     /// The source has no triangle with finite corners, or no extent.
     #[error("nothing to see: no triangle with finite corners and an extent")]
     NothingToSee,
+    /// More branches bend than vertices can name.
+    #[error(
+        "{branches} branches bend in the wind; vertices tell {limit} apart: bake fewer trees in one block"
+    )]
+    TooManyBranches {
+        /// Branches that move.
+        branches: usize,
+        /// The limit.
+        limit: usize,
+    },
     /// The cards do not fit into the largest atlas.
     #[error(
         "the cards take {texels} texels, more than the {limit} of the largest atlas; give a larger --texel"

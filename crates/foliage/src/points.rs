@@ -138,15 +138,31 @@ impl<'a> BentPoints<'a> {
     }
 }
 
+/// Places at most, for as many triangles: 4 million, but one corner and more of each.
+const MOST_PLACES: f64 = 4e6;
+
 /// Places all over the finest level, and what moves them there.
 fn places(foliage: &FoliageBlock) -> Vec<Place> {
-    let spacing = (SPACING * foliage.header.levels[0].texel) as f32;
     let vertices = foliage.vertices[0];
+    let longest = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|v| Vec3::from(vertices[v as usize].position));
+        f64::from(a.distance(b).max(b.distance(c)).max(c.distance(a)))
+    };
+    let steps = |t: &[u32; 3], spacing: f64| (longest(t) / spacing).ceil().clamp(1.0, 256.0);
+    let count = |spacing: f64| -> f64 {
+        foliage.indices[0].par_iter().map(|t| (steps(t, spacing) + 1.0).powi(2) * 0.5).sum()
+    };
+    // No finer than single precision tells, nor than memory holds.
+    let mut spacing = (SPACING * foliage.header.levels[0].texel).max(f64::from(f32::MIN_POSITIVE));
+    // At least a triangle's corners.
+    let most = MOST_PLACES.max(2.0 * foliage.indices[0].len() as f64);
+    while count(spacing) > most {
+        spacing *= 2.0;
+    }
     let of = |t: &[u32; 3]| {
         let corners = t.map(|v| &vertices[v as usize]);
         let [a, b, c] = corners.map(|v| Vec3::from(v.position));
-        let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-        let steps = (longest / spacing).ceil().clamp(1.0, 256.0) as u32;
+        let steps = (steps(t, spacing) as u32).max(1);
         let grid = (0..=steps).flat_map(move |i| (0..=steps - i).map(move |j| [i, j]));
         grid.map(move |[i, j]| {
             let [u, v] = [i, j].map(|k| k as f32 / steps as f32);

@@ -182,6 +182,12 @@ impl BranchRecord {
 /// How far tips rise and fall, in what they move across the wind.
 pub const RISE: f32 = 0.3;
 
+/// Largest angle by which leaves turn in a wind of strength 1, in radians.
+pub const FLUTTER: f32 = 0.35;
+
+/// How often leaves turn to and fro in a second.
+pub const FLUTTER_FREQUENCY: f32 = 1.7;
+
 /// Mean displacement along the wind.
 pub const STEADY: f32 = 0.6;
 

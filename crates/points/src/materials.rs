@@ -52,7 +52,7 @@ pub fn read_materials(pack: &Pack) -> Result<(Vec<Material>, Vec<Arc<Texture>>),
             return Err(invalid(format!("material {i} uses texture {:?} of {count}", m.texture)));
         }
         let relief = m.relief.map(|(texture, scale)| Relief { texture, scale });
-        if let Some(r) = relief.filter(|r| r.texture as usize >= count || !r.scale.is_finite()) {
+        if let Some(r) = relief.filter(|r| !r.is_valid(count)) {
             let (t, scale) = (r.texture, r.scale);
             let problem = format!("material {i} uses normal texture {t} of {count}, times {scale}");
             return Err(invalid(problem));

@@ -9,8 +9,18 @@ use glam::{Vec2, Vec3};
 pub struct Relief {
     /// Index into the textures of the model.
     pub texture: u32,
-    /// Multiplies x and y; finite.
+    /// Multiplies x and y; within ±[`Relief::MOST_SCALE`].
     pub scale: f32,
+}
+
+impl Relief {
+    /// Largest scale: beyond it single precision would not hold lengths.
+    pub const MOST_SCALE: f32 = 1e4;
+
+    /// Whether it may be drawn with a model of so many textures.
+    pub fn is_valid(&self, textures: usize) -> bool {
+        (self.texture as usize) < textures && self.scale.abs() <= Self::MOST_SCALE
+    }
 }
 
 /// A normal texture, ready to be sampled.

@@ -100,7 +100,7 @@ impl TriangleSoup {
                 return fail(format!("material {i} uses texture {:?} of {t}", material.texture));
             }
             if let Some(r) = material.relief
-                && (r.texture as usize >= self.textures.len() || !r.scale.is_finite())
+                && !r.is_valid(self.textures.len())
             {
                 let (t, n, scale) = (r.texture, self.textures.len(), r.scale);
                 return fail(format!("material {i} uses normal texture {t} of {n}, times {scale}"));

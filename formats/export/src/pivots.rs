@@ -59,7 +59,7 @@ fn turned(v: DVec3) -> DVec3 {
 /// The two textures of a pack's branches: an EXR file and a PNG file.
 ///
 /// # Errors
-/// When there are more branches than the textures can tell apart, or a file cannot be encoded.
+/// When there are more branches than the textures can tell apart, one is too far away for half floats, or a file cannot be encoded.
 pub fn pivots(foliage: &FoliageBlock, name: &str) -> Result<[ExportFile; 2], ExportError> {
     let branches = foliage.branches;
     if branches.len() > MOST_BRANCHES {
@@ -69,7 +69,20 @@ pub fn pivots(foliage: &FoliageBlock, name: &str) -> Result<[ExportFile; 2], Exp
     }
     let table = PivotTable::new(branches);
     let size = table.size.map(|s| s as usize);
-    let origin = foliage.origin();
+    // As the vertices of the glb.
+    let origin = foliage.origin() - crate::glb::place(foliage);
+    let farthest = branches
+        .iter()
+        .map(|b| (origin + DVec3::from(b.base.map(f64::from))).abs().max_element() * CENTIMETRES)
+        .fold(0.0, f64::max);
+    if farthest > f64::from(f16::MAX) {
+        let problem = format!(
+            "a branch {farthest:.0} cm from the tree's zero; half floats hold {} cm: export the tree at its own \
+             place",
+            f16::MAX
+        );
+        return Err(ExportError::Unsuited(problem));
+    }
     let pivot = |i: usize| -> (f16, f16, f16, f16) {
         let Some(branch) = branches.get(i) else { return Default::default() };
         let base = origin + DVec3::from(branch.base.map(f64::from));

@@ -9,6 +9,7 @@ use forest_soup::{AlphaMode, Material, Texture, TriangleSoup};
 use glam::DVec3;
 use hashbrown::HashMap;
 use serde_json::{Value, json};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// Foliage with its materials on the way into a glb.
@@ -163,20 +164,28 @@ impl<'a> Levels<'a> {
 }
 
 /// The alpha from which as many texels are shown under `triangles` as their mean coverage is. They are
-/// halves of upright rectangles in the texture.
+/// halves of upright rectangles in the texture, which lie beside each other: of a pack whose rectangles lie over
+/// each other as often as the texture has texels is looked at, and no more.
 fn cutoff(soup: &TriangleSoup, triangles: &[[u32; 3]], texture: &Texture) -> f32 {
     let size = [texture.width, texture.height];
     let mut counts = [0u64; 256];
+    let mut known = HashSet::new();
+    let mut left = u64::from(size[0]) * u64::from(size[1]);
     for t in triangles {
         let corners = t.map(|v| soup.uvs[v as usize].to_array());
         let [columns, rows] = [0, 1].map(|k| {
             let at = corners.map(|c| c[k] * size[k] as f32);
             let [low, high] = [at.into_iter().reduce(f32::min), at.into_iter().reduce(f32::max)];
             let texel = |v: Option<f32>| v.unwrap_or(0.0).round().clamp(0.0, size[k] as f32) as u32;
-            texel(low)..texel(high)
+            [texel(low), texel(high)]
         });
-        for y in rows {
-            for x in columns.clone() {
+        let area = u64::from(columns[1] - columns[0]) * u64::from(rows[1] - rows[0]);
+        if !known.insert((columns, rows)) || area > left {
+            continue;
+        }
+        left -= area;
+        for y in rows[0]..rows[1] {
+            for x in columns[0]..columns[1] {
                 let [.., a] = texture.texels[(y * size[0] + x) as usize];
                 counts[usize::from(a)] += 1;
             }

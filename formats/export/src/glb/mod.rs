@@ -10,7 +10,7 @@ mod planes;
 use crate::ExportError;
 use crate::picture::ExportFile;
 use buffer::Binary;
-use forest_foliage::wind::{RISE, STEADY, SWINGS};
+use forest_foliage::wind::{FLUTTER, FLUTTER_FREQUENCY, RISE, STEADY, SWINGS};
 use forest_foliage::{BranchRecord, FoliageBlock, Wind};
 use forest_views::ViewsBlock;
 use glam::DVec3;
@@ -29,6 +29,13 @@ const SCREEN: [f64; 2] = [1920.0, 1080.0];
 /// bits.
 const FAR: f64 = 1000.0;
 
+/// World place of the zero of a tree's exported vertices.
+pub(crate) fn place(foliage: &FoliageBlock) -> DVec3 {
+    let [min, max] = foliage.bounds();
+    let far = foliage.origin().abs().max_element() > FAR * min.distance(max);
+    if far { foliage.origin() } else { DVec3::ZERO }
+}
+
 /// Of a glb's document and buffer: its length has 32 bits and counts headers and padding too.
 const MOST_BYTES: usize = u32::MAX as usize - 64;
 
@@ -44,8 +51,8 @@ pub fn levels(
     name: &str,
 ) -> Result<ExportFile, ExportError> {
     let [min, max] = foliage.bounds();
-    let far = foliage.origin().abs().max_element() > FAR * min.distance(max);
-    let place = if far { foliage.origin() } else { DVec3::ZERO };
+    let place = place(foliage);
+    let far = place != DVec3::ZERO;
     let (mut binary, mut materials) = (Binary::default(), Materials::default());
     let (mut meshes, mut nodes) = (Vec::new(), Vec::new());
     let mut add = |mesh: Value, name: &str, texel: f64, triangles: usize| {
@@ -85,6 +92,8 @@ pub fn levels(
         "steady": STEADY,
         "swings": SWINGS.to_vec(),
         "rise": RISE,
+        "flutter": FLUTTER,
+        "flutterFrequency": FLUTTER_FREQUENCY,
         "frequency": Wind::default().frequency,
         "origin": (foliage.origin() - place).to_array().to_vec(),
     });

@@ -40,9 +40,12 @@ impl<'a> Planes<'a> {
 
     /// The views that are shown, each once.
     fn views(&self) -> Vec<u32> {
-        let mut views: Vec<u32> =
-            FROM.iter().map(|d| self.block.directions().nearest(*d)).collect();
-        views.dedup();
+        let mut views = Vec::new();
+        for view in FROM.iter().map(|d| self.block.directions().nearest(*d)) {
+            if !views.contains(&view) {
+                views.push(view);
+            }
+        }
         views
     }
 

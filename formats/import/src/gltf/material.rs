@@ -235,8 +235,10 @@ fn relief(
     let Some(normal) = &m.normal_texture else { return Ok(None) };
     // It was left out.
     let Some(&texture) = textures.get(&normal.index.value()) else { return Ok(None) };
-    if !normal.scale.is_finite() {
-        let problem = format!("normalTexture scale {}", normal.scale);
+    let limit = Relief::MOST_SCALE;
+    // What is no number is not within the limit either.
+    if !(-limit..=limit).contains(&normal.scale) {
+        let problem = format!("normalTexture scale {}; from -{limit} to {limit}", normal.scale);
         return Err(source.invalid(format!("material {i}"), problem));
     }
     let fail = |e: serde_json::Error| {
