@@ -25,7 +25,7 @@ CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: foliage light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+.PHONY: snakemake foliage light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
 
 # Installs what variable `missing` of a recipe's shell names, or says what to install.
 INSTALL = if [ -n "$$missing" ]; then \
@@ -118,9 +118,18 @@ check: setup
 	$(CARGO) clippy --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --quiet
 
-test: check gpu screen
+# The workflow engine that the shipped Snakefile is tested with; its test says that it is skipped without it.
+snakemake: setup
+	@[ -x target/snakemake/bin/snakemake ] || { \
+	  missing=; python3 -c 'import ensurepip, venv' 2>/dev/null || missing="$$missing python3 python3-venv"; \
+	  { $(INSTALL); } && python3 -m venv target/snakemake && \
+	  target/snakemake/bin/pip install --quiet --disable-pip-version-check 'snakemake>=9,<10'; } || \
+	  { rm -rf target/snakemake; echo "snakemake cannot be installed: its test is skipped"; }
+
+test: check gpu screen snakemake
 	$(CARGO) build --workspace --bins
-	$(CARGO) test --workspace
+	snakemake=$$PWD/target/snakemake/bin/snakemake; [ ! -x "$$snakemake" ] || export SNAKEMAKE=$$snakemake; \
+	  $(CARGO) test --workspace
 
 bench: setup
 	$(CARGO) build --release --workspace --bins

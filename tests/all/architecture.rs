@@ -20,6 +20,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("forest-soup", &[]),
     ("forest-pack", &[]),
     ("forest-import", &["forest-soup"]),
+    ("forest-batch", &["forest-import", "forest-pack"]),
     ("forest-points", &["forest-soup", "forest-pack"]),
     ("forest-raster", &["forest-soup"]),
     ("forest-vq", &[]),
@@ -91,6 +92,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "forest-bake",
         &[
+            "forest-batch",
             "forest-foliage",
             "forest-soup",
             "forest-pack",

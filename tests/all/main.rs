@@ -1,6 +1,7 @@
 //! One test binary; a line a module says what belongs there.
 
 mod architecture; // the arrows between crates, licences, one version of what must be one
+mod batch; // many assets: what is baked again, kills, caches, workflow engines
 mod blocks; // several trees baked together
 mod cli; // the program: usage, exit codes, what it prints, what it leaves behind
 mod eval; // packs against their sources: reports, calibration, chosen levels

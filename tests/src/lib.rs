@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 
 /// A fixed `meta` section.
 fn no_meta() -> Meta {
-    Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![] }
+    Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![], options: vec![] }
 }
 
 /// Bakes into memory; the pack has a fixed `meta` section.

@@ -1,6 +1,7 @@
 //! `forest-bake capture`.
 
 use crate::failure::Usage;
+use crate::log::Log;
 use crate::output;
 use crate::source::SourceArgs;
 use crate::volume::stand;
@@ -38,7 +39,7 @@ pub(crate) struct Args {
     force: bool,
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     let stand = stand(&args.stand, args.cameras)?;
     if !(args.distance > 1.05 && args.distance < 1e6) {
         let problem = format!("--distance {}: above 1.05 radii and below a million", args.distance);
@@ -49,7 +50,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         let problem = format!("{}: exists; give --force to replace it", target.display());
         return Err(Usage(problem).into());
     }
-    let source = args.source.load(quiet)?;
+    let source = args.source.load(log)?;
     let soup = &source.soup;
     soup.validate()?;
     let bounds = soup.bounds();
@@ -62,7 +63,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let surfaces = Surfaces::new(&soup.materials, &soup.textures);
     let style = Style { sampling: Sampling { side: args.samples, seed: 1 }, light: Light::Albedo };
     let projection = Projection::Perspective { fov_y: 2.0 * (1.02 / args.distance).asin() };
-    let bar = output::bar(u64::from(args.cameras), "photographs", quiet);
+    let bar = output::bar(u64::from(args.cameras), "photographs", log);
     let photos: Vec<Photograph> = (0..)
         .zip(stand.directions())
         .map(|(i, from)| {
@@ -80,7 +81,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     for file in photographs(&photos)? {
         output::write_file(&args.output.join(&file.name), &file.bytes)?;
     }
-    if !quiet {
+    if log.says() {
         let folder = args.output.display();
         eprintln!("{folder}: {} photographs of {}² pixels", photos.len(), args.size);
     }

@@ -2,6 +2,7 @@
 
 use crate::failure::Usage;
 use crate::light::LightArg;
+use crate::log::Log;
 use crate::output;
 use anyhow::{Context, Result, bail};
 use forest_draw::{
@@ -140,7 +141,7 @@ fn positive(text: &str) -> Result<f32, String> {
     if value > 0.0 { Ok(value) } else { Err("it must be above 0".into()) }
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     if args.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(
             Usage(format!("{}: pictures are written as .png", args.output.display())).into()
@@ -163,10 +164,10 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         return Err(Usage(problem.into()).into());
     }
     let pictures = match what {
-        Representation::Points => draw_all_points(args, &pack, &style, quiet)?,
-        Representation::Views => draw_all_views(args, &pack, &style, quiet)?,
-        Representation::Volume => draw_all_volumes(args, &pack, &style, quiet)?,
-        Representation::Foliage => draw_all_foliage(args, &pack, &style, quiet)?,
+        Representation::Points => draw_all_points(args, &pack, &style, log)?,
+        Representation::Views => draw_all_views(args, &pack, &style, log)?,
+        Representation::Volume => draw_all_volumes(args, &pack, &style, log)?,
+        Representation::Foliage => draw_all_foliage(args, &pack, &style, log)?,
     };
     write(args, &pictures)
 }
@@ -202,7 +203,7 @@ impl Args {
     }
 }
 
-fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+fn draw_all_points(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<Vec<Picture>> {
     let block = PointsBlock::open(pack)?;
     let surfaces = read_surfaces(pack, &block)?;
     let [min, max] = [block.header.min, block.header.max].map(|v| block.to_world(v.into()));
@@ -212,19 +213,19 @@ fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resu
     let pose = tied.as_ref().map(|(f, _)| Pose::new(f.branches, &args.wind, 0.0));
     let bent = tied.as_ref().zip(pose.as_ref()).map(|((f, w), pose)| BentPoints::new(f, w, pose));
     let mut pictures = Vec::new();
-    for thresholds in args.levels(pack, &block, &camera, quiet)? {
+    for thresholds in args.levels(pack, &block, &camera, log)? {
         let (surfaces, cut) = (surfaces.as_ref(), &thresholds);
         let (picture, drawn) = match &bent {
             Some(bent) => draw_bent_points(&block, surfaces, &camera, cut, style, bent),
             None => draw_points(&block, surfaces, &camera, cut, style),
         };
-        if !quiet && block.is_beyond(&camera, &thresholds) {
+        if block.is_beyond(&camera, &thresholds) {
             let (name, finest) = (pack.path().display(), thresholds.finest.0);
-            eprintln!(
-                "warning: {name}: pruned; has no points of {finest} px² here, the finest are drawn"
-            );
+            log.warn(format!(
+                "{name}: pruned; has no points of {finest} px² here, the finest are drawn"
+            ));
         }
-        if !quiet {
+        if log.says() {
             eprintln!(
                 "s_m {} px²: {} points, {} triangles, coverage {:.4}",
                 thresholds.finest.0,
@@ -238,7 +239,7 @@ fn draw_all_points(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resu
     Ok(pictures)
 }
 
-fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+fn draw_all_views(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<Vec<Picture>> {
     if args.error.is_some() || args.budget.is_some() {
         bail!(Usage("--error and --budget choose levels of points; --texel those of views".into()));
     }
@@ -252,7 +253,7 @@ fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resul
         let chosen = select(&block, &camera, lookup, args.texel);
         let level = ViewsLevel::read(&block, chosen.level)?;
         let (picture, drawn) = level.draw(&camera, lookup, style);
-        if !quiet {
+        if log.says() {
             eprintln!(
                 "{}: {} of {} views of {}² texels, {}, coverage {:.4}",
                 lookup.name(),
@@ -268,7 +269,7 @@ fn draw_all_views(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Resul
     Ok(pictures)
 }
 
-fn draw_all_foliage(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+fn draw_all_foliage(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<Vec<Picture>> {
     if args.error.is_some() || args.budget.is_some() {
         let rule =
             "--error and --budget choose levels of points; --level and --texel those of foliage";
@@ -288,7 +289,7 @@ fn draw_all_foliage(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Res
     let mut pictures = Vec::new();
     for level in levels {
         let picture = scene.draw(&camera, level, &args.wind, style);
-        if !quiet {
+        if log.says() {
             let header = &block.header.levels[level];
             eprintln!(
                 "level {level}: texel {:.4}, {} triangles, coverage {:.4}",
@@ -302,7 +303,7 @@ fn draw_all_foliage(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Res
     Ok(pictures)
 }
 
-fn draw_all_volumes(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Result<Vec<Picture>> {
+fn draw_all_volumes(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<Vec<Picture>> {
     if args.error.is_some() || args.budget.is_some() {
         let rule =
             "--error and --budget choose levels of points; --level and --texel those of a volume";
@@ -332,7 +333,7 @@ fn draw_all_volumes(args: &Args, pack: &Pack, style: &Style, quiet: bool) -> Res
     let mut pictures = Vec::new();
     for detail in details {
         let (picture, drawn) = scene.draw(&camera, detail, blending, style);
-        if !quiet {
+        if log.says() {
             eprintln!(
                 "{} cells, {} billboards, {}, coverage {:.4}",
                 output::count(drawn.cells),
@@ -353,7 +354,7 @@ impl Args {
         pack: &Pack,
         block: &PointsBlock,
         camera: &Camera,
-        quiet: bool,
+        log: Log,
     ) -> Result<Vec<Thresholds>> {
         if let Some(most) = self.budget {
             let found = within_budget(block, camera, Thresholds::LARGEST_RATIO, most);
@@ -384,18 +385,18 @@ impl Args {
                 "{name}: no measured level has FLIP {limit} at {pixels:.0} pixels; the least is {least:.4}"
             );
         };
-        if !quiet {
+        if log.says() {
             eprintln!(
                 "chosen at {:.0} pixels: FLIP {:.4} in the worst measured view, under base colours",
                 need.pixel_height, choice.error
             );
-            if choice.beyond {
-                let (low, high) = table.heights(&need);
-                eprintln!(
-                    "warning: {name}: measured from {low} to {high} pixels: these are the figures of \
-                     the nearest height and elevation"
-                );
-            }
+        }
+        if choice.beyond {
+            let (low, high) = table.heights(&need);
+            log.warn(format!(
+                "{name}: measured from {low} to {high} pixels: these are the figures of the nearest \
+                 height and elevation"
+            ));
         }
         Ok(vec![Thresholds::of_level(choice.level)])
     }

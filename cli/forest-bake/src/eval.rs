@@ -2,6 +2,7 @@
 
 use crate::failure::Usage;
 use crate::light::LightArg;
+use crate::log::Log;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource};
 use anyhow::{Context, Result};
@@ -76,7 +77,7 @@ pub(crate) struct Args {
     schema: bool,
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     if args.schema {
         return Ok(output::print(&forest_eval::json_schema())?);
     }
@@ -88,44 +89,32 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     }
     let start = Instant::now();
     let pack = Pack::open(path)?;
-    let source = args.import.load(&args.source, quiet)?;
+    let source = args.import.load(&args.source, log)?;
     refuse_other_source(&pack, &source)?;
-    let points = if PointsBlock::is_in(&pack) { Some(PointsBlock::open(&pack)?) } else { None };
-    let views = if ViewsBlock::is_in(&pack) { Some(ViewsBlock::open(&pack)?) } else { None };
-    let volume = if VolumeBlock::is_in(&pack) { Some(VolumeBlock::open(&pack)?) } else { None };
-    let foliage = if FoliageBlock::is_in(&pack) { Some(FoliageBlock::open(&pack)?) } else { None };
-    if points.is_none() && views.is_none() && volume.is_none() && foliage.is_none() {
-        // Says what is missing.
-        PointsBlock::open(&pack)?;
-    }
-    let judge = Judge::new(&source.soup, &plan, quiet);
+    let blocks = Blocks::open(&pack)?;
+    let judge = Judge::new(&source.soup, &plan, log);
     let truth = judge.truth()?;
-    let pack_surfaces = points.as_ref().map(|block| read_surfaces(&pack, block)).transpose()?;
-    let pack_surfaces = pack_surfaces.flatten();
-    let others = points.as_ref().filter(|_| !args.alone);
+    let drawn = Drawn::read(&pack, &blocks)?;
+    let points = blocks.points.as_ref();
+    let others = points.filter(|_| !args.alone);
     let baselines = others.map(|block| Baselines::new(&source.soup, block)).transpose()?;
-    let blocks = baselines.as_ref().map(Baselines::blocks).transpose()?;
-    let raw = points.as_ref().and_then(Baselines::raw);
-    let mut contenders = match (&points, &baselines, &blocks) {
-        (Some(points), Some(b), Some(blocks)) => {
-            b.contenders(points, raw.as_ref(), pack_surfaces.as_ref(), blocks)
+    let of_baselines = baselines.as_ref().map(Baselines::blocks).transpose()?;
+    let raw = points.and_then(Baselines::raw);
+    let mut contenders = match (points, &baselines, &of_baselines) {
+        (Some(points), Some(b), Some(of_baselines)) => {
+            b.contenders(points, raw.as_ref(), drawn.surfaces.as_ref(), of_baselines)
         }
-        (Some(points), ..) => own_contenders(points, pack_surfaces.as_ref()),
+        (Some(points), ..) => own_contenders(points, drawn.surfaces.as_ref()),
         (None, ..) => vec![],
     };
-    let levels = views.as_ref().map(|v| all_levels(v)).transpose()?.unwrap_or_default();
-    contenders.extend(views_contenders(&levels));
-    let scene = volume.as_ref().map(VolumeScene::read).transpose()?;
-    contenders.extend(volume_contenders(scene.as_ref()));
-    let leaves = foliage.as_ref().map(FoliageScene::read).transpose()?;
-    contenders.extend(foliage_contenders(leaves.as_ref()));
+    contenders.extend(drawn.contenders());
     let found = judge.sweep(&truth, &contenders)?;
     let exhibits = match args.html {
         Some(_) => report::gallery(&truth, &contenders, &plan, &found)?,
         None => vec![],
     };
     let table = args.embed.then(|| measures(&found, &plan));
-    let subject = subject(path, &pack, points.as_ref(), &source, start.elapsed().as_secs_f64());
+    let subject = subject(path, &pack, points, &source, start.elapsed().as_secs_f64());
     let evaluation = Evaluation::new(subject, &plan, &contenders, found);
     let text = if args.json {
         serde_json::to_string_pretty(&evaluation)? + "\n"
@@ -147,7 +136,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     // Last: nothing of the above touches the pack if it fails.
     if let Some(table) = table {
         embed(&pack, path, &table, None)?;
-        if !quiet {
+        if log.says() {
             eprintln!(
                 "{}: wrote {} measured rows ({})",
                 path.display(),
@@ -159,9 +148,81 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     Ok(())
 }
 
-/// All levels of a pack's views, decoded.
-fn all_levels<'a>(views: &'a ViewsBlock<'a>) -> Result<Vec<ViewsLevel<'a>>, PackError> {
-    (0..views.header.levels.len()).map(|level| ViewsLevel::read(views, level)).collect()
+/// The representations of a pack.
+struct Blocks<'p> {
+    points: Option<PointsBlock<'p>>,
+    views: Option<ViewsBlock<'p>>,
+    volume: Option<VolumeBlock<'p>>,
+    foliage: Option<FoliageBlock<'p>>,
+}
+
+impl<'p> Blocks<'p> {
+    fn open(pack: &'p Pack) -> Result<Self, PackError> {
+        let new = Self {
+            points: PointsBlock::is_in(pack).then(|| PointsBlock::open(pack)).transpose()?,
+            views: ViewsBlock::is_in(pack).then(|| ViewsBlock::open(pack)).transpose()?,
+            volume: VolumeBlock::is_in(pack).then(|| VolumeBlock::open(pack)).transpose()?,
+            foliage: FoliageBlock::is_in(pack).then(|| FoliageBlock::open(pack)).transpose()?,
+        };
+        if new.points.is_none()
+            && new.views.is_none()
+            && new.volume.is_none()
+            && new.foliage.is_none()
+        {
+            // Says what is missing.
+            PointsBlock::open(pack)?;
+        }
+        Ok(new)
+    }
+}
+
+/// What representations are drawn from, decoded.
+struct Drawn<'b> {
+    surfaces: Option<Surfaces>,
+    levels: Vec<ViewsLevel<'b>>,
+    volume: Option<VolumeScene<'b>>,
+    foliage: Option<FoliageScene<'b>>,
+}
+
+impl<'b> Drawn<'b> {
+    fn read(pack: &Pack, blocks: &'b Blocks) -> Result<Self, PackError> {
+        let surfaces = blocks.points.as_ref().map(|p| read_surfaces(pack, p)).transpose()?;
+        let all = |views: &'b ViewsBlock| {
+            (0..views.header.levels.len()).map(|level| ViewsLevel::read(views, level)).collect()
+        };
+        let levels = blocks.views.as_ref().map(all).transpose()?;
+        Ok(Self {
+            surfaces: surfaces.flatten(),
+            levels: levels.unwrap_or_default(),
+            volume: blocks.volume.as_ref().map(VolumeScene::read).transpose()?,
+            foliage: blocks.foliage.as_ref().map(FoliageScene::read).transpose()?,
+        })
+    }
+
+    /// All levels, but those of points.
+    fn contenders(&'b self) -> Vec<Contender<'b>> {
+        let mut all = views_contenders(&self.levels);
+        all.extend(volume_contenders(self.volume.as_ref()));
+        all.extend(foliage_contenders(self.foliage.as_ref()));
+        all
+    }
+}
+
+/// Judges all representations of `pack`, baked from `soup`, and writes the table into it.
+pub(crate) fn judge(path: &Path, soup: &TriangleSoup, log: Log) -> Result<()> {
+    let pack = Pack::open(path)?;
+    // How levels follow each other is not asked.
+    let plan = Plan { steps: 0, ..Plan::default() };
+    let judge = Judge::new(soup, &plan, log);
+    let truth = judge.truth()?;
+    let blocks = Blocks::open(&pack)?;
+    let drawn = Drawn::read(&pack, &blocks)?;
+    let points = blocks.points.as_ref();
+    let mut contenders =
+        points.map(|p| own_contenders(p, drawn.surfaces.as_ref())).unwrap_or_default();
+    contenders.extend(drawn.contenders());
+    let table = measures(&judge.sweep(&truth, &contenders)?, &plan);
+    embed(&pack, path, &table, None)
 }
 
 impl Args {
@@ -185,12 +246,12 @@ struct Judge<'a> {
     soup: &'a TriangleSoup,
     surfaces: Surfaces,
     plan: &'a Plan,
-    quiet: bool,
+    log: Log,
 }
 
 impl<'a> Judge<'a> {
-    fn new(soup: &'a TriangleSoup, plan: &'a Plan, quiet: bool) -> Self {
-        Self { soup, surfaces: Surfaces::new(&soup.materials, &soup.textures), plan, quiet }
+    fn new(soup: &'a TriangleSoup, plan: &'a Plan, log: Log) -> Self {
+        Self { soup, surfaces: Surfaces::new(&soup.materials, &soup.textures), plan, log }
     }
 
     fn truth(&self) -> Result<Truth<'_>> {
@@ -199,7 +260,7 @@ impl<'a> Judge<'a> {
     }
 
     fn sweep(&self, truth: &Truth, contenders: &[Contender]) -> Result<Sweep> {
-        let bar = output::bar(pictures(self.plan, contenders), "pictures", self.quiet);
+        let bar = output::bar(pictures(self.plan, contenders), "pictures", self.log);
         let found = sweep(truth, contenders, self.plan, &|n| bar.set_position(n))?;
         bar.finish_and_clear();
         Ok(found)
@@ -207,13 +268,13 @@ impl<'a> Judge<'a> {
 }
 
 /// Calibrates and measures `pack`, just baked from `soup`, and writes it with both to `target`.
-pub(crate) fn measure(pack: &Path, target: &Path, soup: &TriangleSoup, quiet: bool) -> Result<()> {
+pub(crate) fn measure(pack: &Path, target: &Path, soup: &TriangleSoup, log: Log) -> Result<()> {
     let pack = Pack::open(pack)?;
     let mut block = PointsBlock::open(&pack)?;
     let plan = Plan { views: 9, steps: 0, ..Plan::default() };
-    let judge = Judge::new(soup, &plan, quiet);
+    let judge = Judge::new(soup, &plan, log);
     let truth = judge.truth()?;
-    let bar = output::bar(100, "calibration", quiet);
+    let bar = output::bar(100, "calibration", log);
     let found = calibrate(&truth, &block, &|share| bar.set_position((100.0 * share) as u64))
         .with_context(|| target.display().to_string())?;
     bar.finish_and_clear();

@@ -1,6 +1,7 @@
 //! `forest-bake export`.
 
 use crate::failure::Usage;
+use crate::log::Log;
 use crate::output;
 use anyhow::{Context, Result};
 use forest_export::{Engine, PlainFormat, for_engine, levels, pivots, plain, splats};
@@ -74,7 +75,7 @@ impl FormatArg {
     }
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     let pack = Pack::open(&args.pack)?;
     let stem = args.pack.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = args.name.clone().unwrap_or(stem);
@@ -117,7 +118,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     for file in &files {
         let path = args.output.join(&file.name);
         output::write_file(&path, &file.bytes)?;
-        if !quiet {
+        if log.says() {
             eprintln!("{}: {}", path.display(), output::bytes(file.bytes.len() as u64));
         }
     }

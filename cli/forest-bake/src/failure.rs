@@ -1,5 +1,6 @@
 //! Errors to exit codes.
 
+use forest_batch::BatchError;
 use forest_eval::EvalError;
 use forest_export::ExportError;
 use forest_foliage::FoliageError;
@@ -27,9 +28,23 @@ impl std::fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
+/// An error in words: its causes, but for those that it names itself.
+pub(crate) fn told(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let own = cause.to_string();
+        if own.starts_with(&text) {
+            text = own;
+        } else if !text.contains(&own) {
+            text = format!("{text}: {own}");
+        }
+    }
+    text
+}
+
 /// The documented code of an error: by the first cause that has one.
-pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
-    ExitCode::from(error.chain().find_map(number).unwrap_or(4))
+pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
+    error.chain().find_map(number).unwrap_or(4)
 }
 
 fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
@@ -40,6 +55,9 @@ fn number(cause: &(dyn std::error::Error + 'static)) -> Option<u8> {
         return Some(2);
     }
     if let Some(e) = cause.downcast_ref::<ImportError>() {
+        return Some(e.exit_code());
+    }
+    if let Some(e) = cause.downcast_ref::<BatchError>() {
         return Some(e.exit_code());
     }
     if let Some(e) = cause.downcast_ref::<PackError>() {

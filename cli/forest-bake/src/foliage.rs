@@ -1,10 +1,11 @@
 //! `forest-bake foliage`.
 
+use crate::log::Log;
 use crate::output;
-use crate::source::SourceArgs;
+use crate::source::{LoadedSource, SourceArgs};
 use crate::target;
 use anyhow::Result;
-use forest_foliage::{BakeReport, FoliageOptions, PartsOptions, WoodWay, bake};
+use forest_foliage::{BakeReport, FoliageOptions, PartsOptions, WoodWay};
 use forest_pack::{PackWriter, SectionId, header, kind};
 use glam::DVec3;
 use serde::Serialize;
@@ -41,18 +42,41 @@ pub(crate) struct Args {
     json: bool,
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
+    args.check()?;
+    let source = args.source.load(log)?;
+    let summary = bake(args, &source, log)?;
+    if args.json {
+        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+    }
+    Ok(())
+}
+
+impl Args {
+    /// Whether its options make sense.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.options().map(|_| ())
+    }
+
+    fn options(&self) -> Result<FoliageOptions> {
+        let parts = PartsOptions { leaf: self.leaf.clone(), wood: self.wood.clone() };
+        let (texel, levels, blocks) = (self.texel, self.levels, !self.lossless);
+        let options = FoliageOptions { parts, texel, levels, blocks };
+        options.validate().map_err(crate::failure::Usage)?;
+        Ok(options)
+    }
+}
+
+/// Bakes what was read.
+pub(crate) fn bake(args: &Args, source: &LoadedSource, log: Log) -> Result<Summary> {
     let start = Instant::now();
-    let parts = PartsOptions { leaf: args.leaf.clone(), wood: args.wood.clone() };
-    let options =
-        FoliageOptions { parts, texel: args.texel, levels: args.levels, blocks: !args.lossless };
-    options.validate().map_err(crate::failure::Usage)?;
-    let source = args.source.load(quiet)?;
+    let options = args.options()?;
     let kept = target::existing(&args.output, &source.meta, args.force)?;
     let mut writer = PackWriter::create(&args.output)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
-    let bar = output::bar(u64::from(args.levels), "levels", quiet);
-    let report = bake(&source.soup, &options, &mut writer, &|n| bar.set_position(n))?;
+    let bar = output::bar(u64::from(args.levels), "levels", log);
+    let report =
+        forest_foliage::bake(&source.soup, &options, &mut writer, &|n| bar.set_position(n))?;
     bar.finish_and_clear();
     if let Some(pack) = &kept {
         let own = |k| {
@@ -63,20 +87,17 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     }
     writer.finish()?;
     target::tie(&args.output)?;
-    let seconds = [source.seconds, start.elapsed().as_secs_f64()];
+    let seconds = [source.seconds, source.seconds + start.elapsed().as_secs_f64()];
     let summary = Summary::new(args, &report, seconds)?;
-    if !quiet {
+    if log.says() {
         summary.tell();
     }
-    if args.json {
-        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
-    }
-    Ok(())
+    Ok(summary)
 }
 
 /// What was done, for people and programs.
 #[derive(Serialize)]
-struct Summary {
+pub(crate) struct Summary {
     output: PathBuf,
     bytes: u64,
     materials: Vec<MaterialSummary>,

@@ -3,8 +3,9 @@
 mod foliage;
 mod volume;
 
+use crate::all::Preset;
 use crate::output;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use foliage::FoliageReport;
 use forest_foliage::FoliageBlock;
 use forest_pack::header::{self, Meta};
@@ -23,8 +24,11 @@ use volume::VolumeReport;
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Pack to look into.
-    #[arg(value_name = "PACK")]
-    pack: PathBuf,
+    #[arg(value_name = "PACK", required_unless_present = "presets")]
+    pack: Option<PathBuf>,
+    /// Print the presets of `all`, and stop.
+    #[arg(long)]
+    presets: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -38,6 +42,8 @@ struct Report {
     generator: String,
     source_hash: String,
     sources: Vec<SourceReport>,
+    /// The preset and options of `all`; empty where representations were baked one by one.
+    options: Vec<String>,
     sections: Vec<SectionReport>,
     points: Option<PointsReport>,
     views: Option<ViewsReport>,
@@ -165,7 +171,12 @@ impl ViewsReport {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let report = Report::of(&Pack::open(&args.pack)?)?;
+    if args.presets {
+        let all: String = Preset::ALL.iter().map(|p| p.text()).collect();
+        return Ok(output::print(&all)?);
+    }
+    let path = args.pack.as_deref().context("no pack")?;
+    let report = Report::of(&Pack::open(path)?)?;
     let text = if args.json {
         format!("{}\n", serde_json::to_string_pretty(&report)?)
     } else {
@@ -205,6 +216,7 @@ impl Report {
             file: pack.path().into(),
             bytes: pack.file_length(),
             generator: meta.generator,
+            options: meta.options,
             source_hash: hex(&meta.source_hash),
             sources,
             sections,
@@ -241,6 +253,9 @@ impl Report {
         for s in &self.sources {
             let at = if s.placement.is_empty() { "" } else { " at " };
             writeln!(t, "  {}{at}{}", s.name, s.placement)?;
+        }
+        if !self.options.is_empty() {
+            writeln!(t, "baked with {}", self.options.join(" "))?;
         }
         if let Some(p) = &self.points {
             p.text(&mut t)?;

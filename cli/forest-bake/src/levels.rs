@@ -1,5 +1,6 @@
 //! `forest-bake levels`.
 
+use crate::log::Log;
 use crate::output;
 use crate::source::{PointsOptions, SourceArgs};
 use anyhow::Result;
@@ -45,8 +46,8 @@ const WAYS: [(&str, RadiusRule, Order); 4] = [
     ("paper radius and order", RadiusRule::Paper, Order::Paper),
 ];
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
-    let source = args.source.load(quiet)?;
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
+    let source = args.source.load(log)?;
     let options = args.options.bake_options(source.trees)?;
     let mut tables = Vec::new();
     for (name, radius, order) in WAYS {

@@ -1,5 +1,7 @@
 //! `forest-bake`: tree models in, LOD packs out. One file a subcommand; no algorithm here.
 
+mod all;
+mod batch;
 mod capture;
 mod draw;
 mod eval;
@@ -9,10 +11,13 @@ mod foliage;
 mod inspect;
 mod levels;
 mod light;
+mod log;
 mod needs;
 mod output;
 mod points;
 mod scene;
+mod schema;
+mod shell;
 mod source;
 mod target;
 mod verify;
@@ -20,6 +25,8 @@ mod views;
 mod volume;
 
 use clap::{Parser, Subcommand};
+use forest_batch::Event;
+use log::{Form, Log};
 use std::process::ExitCode;
 
 /// Bakes tree models (glTF, OBJ) and photographs of trees into LOD packs.
@@ -34,6 +41,12 @@ struct Args {
     /// Say nothing but errors.
     #[arg(short, long, global = true)]
     quiet: bool,
+    /// Say what takes how long.
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
+    /// What is told on stderr: sentences (text), or one JSON event a line (json).
+    #[arg(long, global = true, value_enum, default_value = "text", hide_possible_values = true)]
+    log: Form,
     /// Use this many threads (default: all cores). The result does not depend on it.
     #[arg(long, global = true, value_name = "N")]
     threads: Option<usize>,
@@ -41,6 +54,11 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Bake all representations with one import, by a preset.
+    All(all::Args),
+    /// Bake many assets as a manifest says: what has changed, several at once.
+    Batch(batch::Args),
+
     /// Bake clustered, size-sorted points.
     Points(points::Args),
     /// Bake views: pictures from many directions, in an atlas.
@@ -67,6 +85,12 @@ enum Command {
     Verify(verify::Args),
     /// Print what each radius rule and order keeps, level by level.
     Levels(levels::Args),
+    /// Print the JSON schemas of what is written and read.
+    Schema(schema::Args),
+    /// Print completions for a shell.
+    Completions(shell::CompletionsArgs),
+    /// Write manual pages.
+    Man(shell::ManArgs),
 }
 
 fn main() -> ExitCode {
@@ -79,33 +103,44 @@ fn main() -> ExitCode {
             return if wrong { failure::USAGE } else { ExitCode::SUCCESS };
         }
     };
-    match run(args) {
+    let log = Log { form: args.log, quiet: args.quiet, verbose: args.verbose, part: false };
+    match run(args, log) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("forest-bake: {error:#}");
-            failure::exit_code(&error)
+            let code = failure::exit_code(&error);
+            match log.form {
+                Form::Text => eprintln!("forest-bake: {}", failure::told(&error)),
+                Form::Json => {
+                    log.event(Event::Failed { error: failure::told(&error), code: Some(code) });
+                }
+            }
+            ExitCode::from(code)
         }
     }
 }
 
-fn run(args: Args) -> anyhow::Result<()> {
+fn run(args: Args, log: Log) -> anyhow::Result<()> {
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
-    let quiet = args.quiet;
     match args.command {
-        Command::Points(a) => points::run(&a, quiet),
-        Command::Views(a) => views::run(&a, quiet),
-        Command::Volume(a) => volume::run(&a, quiet),
-        Command::Foliage(a) => foliage::run(&a, quiet),
-        Command::Capture(a) => capture::run(&a, quiet),
-        Command::Export(a) => export::run(&a, quiet),
-        Command::Scene(a) => scene::run(&a, quiet),
+        Command::All(a) => all::run(&a, log),
+        Command::Batch(a) => batch::run(&a, args.threads, log),
+        Command::Points(a) => points::run(&a, log),
+        Command::Views(a) => views::run(&a, log),
+        Command::Volume(a) => volume::run(&a, log),
+        Command::Foliage(a) => foliage::run(&a, log),
+        Command::Capture(a) => capture::run(&a, log),
+        Command::Export(a) => export::run(&a, log),
+        Command::Scene(a) => scene::run(&a, log),
         Command::Needs(a) => needs::run(&a),
-        Command::Draw(a) => draw::run(&a, quiet),
-        Command::Eval(a) => eval::run(&a, quiet),
+        Command::Draw(a) => draw::run(&a, log),
+        Command::Eval(a) => eval::run(&a, log),
         Command::Inspect(a) => inspect::run(&a),
-        Command::Verify(a) => verify::run(&a, quiet),
-        Command::Levels(a) => levels::run(&a, quiet),
+        Command::Verify(a) => verify::run(&a, log),
+        Command::Levels(a) => levels::run(&a, log),
+        Command::Schema(a) => schema::run(&a),
+        Command::Completions(a) => shell::completions(&a),
+        Command::Man(a) => shell::man(&a),
     }
 }

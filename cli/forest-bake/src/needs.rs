@@ -208,6 +208,12 @@ fn of_packs(args: &Args, packs: &[PathBuf], [finest, largest]: [f64; 2]) -> Resu
     Ok(Report { packs, budget: None })
 }
 
+/// Writes packs without what is not drawn from `--nearest` on; tells nothing.
+pub(crate) fn keep(args: &Args) -> Result<()> {
+    of_packs(args, &args.inputs, thresholds(args)?)?;
+    Ok(())
+}
+
 /// The levels of views that a camera draws whose eye is so far from the tree's box, or farther.
 fn levels(views: &ViewsBlock, nearest: f64, args: &Args) -> std::ops::Range<usize> {
     let projection = Projection::Perspective { fov_y: args.fov.to_radians() };
@@ -251,6 +257,8 @@ fn write(
         kind::POINTS_HEADER..kind::VOLUME_HEADER | kind::WIND_POINTS | kind::WIND_TRIANGLES => {
             false
         }
+        // What points and views show of the light.
+        kind::LIGHT_CROWN => true,
         kind::VOLUME_HEADER.. => !of_scene,
         _ => true,
     };

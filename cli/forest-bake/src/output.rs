@@ -1,6 +1,7 @@
 //! Data on stdout, everything else on stderr.
 
 use crate::failure::Usage;
+use crate::log::Log;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{ErrorKind, Write};
@@ -15,8 +16,9 @@ pub(crate) fn print(text: &str) -> std::io::Result<()> {
 }
 
 /// A bar on a terminal, nothing elsewhere.
-pub(crate) fn bar(total: u64, what: &'static str, quiet: bool) -> ProgressBar {
-    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+pub(crate) fn bar(total: u64, what: &'static str, log: Log) -> ProgressBar {
+    let target =
+        if log.says() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(total), target);
     let template = "{msg} [{bar:40}] {human_pos}/{human_len} {eta}";
     if let Ok(style) = ProgressStyle::with_template(template) {

@@ -1,12 +1,13 @@
 //! `forest-bake points`.
 
+use crate::log::Log;
 use crate::output;
 use crate::source::{LoadedSource, PointsOptions, SourceArgs};
 use crate::target;
 use anyhow::Result;
 use forest_pack::header;
 use forest_pack::{Pack, PackWriter, SectionId, kind};
-use forest_points::{BakeOptions, BakeReport, Order, RadiusRule, bake};
+use forest_points::{BakeOptions, BakeReport, Order, RadiusRule};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -59,15 +60,24 @@ enum Sorting {
     Paper,
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
+    let source = args.source.load(log)?;
+    let summary = bake(args, &source, log)?;
+    if args.json {
+        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+    }
+    Ok(())
+}
+
+/// Bakes what was read.
+pub(crate) fn bake(args: &Args, source: &LoadedSource, log: Log) -> Result<Summary> {
     let start = Instant::now();
-    let source = args.source.load(quiet)?;
     let kept = target::existing(&args.output, &source.meta, args.force)?;
     let options = args.bake_options(source.trees)?;
     let measured = |p: &Pack| p.contains(SectionId::new(kind::POINTS_CALIBRATION, 0));
-    if kept.as_ref().is_some_and(measured) && !args.measure && !quiet {
+    if kept.as_ref().is_some_and(measured) && !args.measure {
         let name = args.output.display();
-        eprintln!("warning: {name}: was measured and calibrated; the new one is not (--measure)");
+        log.warn(format!("{name}: was measured and calibrated; the new one is not (--measure)"));
     }
     // A pack that is to be measured takes its name only once it is.
     let unmeasured = if args.measure { Some(tempfile::tempdir()?) } else { None };
@@ -77,8 +87,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     };
     let mut writer = PackWriter::create(&baked)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
-    let bar = output::bar(source.soup.triangles.len() as u64, "points", quiet);
-    let report = bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
+    let bar = output::bar(source.soup.triangles.len() as u64, "points", log);
+    let report =
+        forest_points::bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
     bar.finish_and_clear();
     if let Some(pack) = &kept {
         target::keep_others(&mut writer, pack, kind::POINTS_HEADER, |k| is_own(k, &options))?;
@@ -86,19 +97,25 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     writer.finish()?;
     target::tie(&baked)?;
     if args.measure {
-        crate::eval::measure(&baked, &args.output, &source.soup, quiet)?;
+        crate::eval::measure(&baked, &args.output, &source.soup, log)?;
     }
-    let summary = Summary::new(&args.output, &source, &report, start.elapsed().as_secs_f64())?;
-    if !quiet {
-        summary.tell(&report);
+    if let Some(dropped) = report.header.counts.dropped() {
+        log.warn(format!("left out triangles: {dropped}"));
     }
-    if args.json {
-        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+    let seconds = source.seconds + start.elapsed().as_secs_f64();
+    let summary = Summary::new(&args.output, source, &report, seconds)?;
+    if log.says() {
+        summary.tell();
     }
-    Ok(())
+    Ok(summary)
 }
 
 impl Args {
+    /// Whether its options make sense.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.bake_options(1).map(|_| ())
+    }
+
     fn bake_options(&self, trees: usize) -> Result<BakeOptions> {
         Ok(BakeOptions {
             radius: match self.radius {
@@ -127,7 +144,7 @@ fn is_own(kind: u16, options: &BakeOptions) -> bool {
 
 /// What was done, for people and programs.
 #[derive(Serialize)]
-struct Summary {
+pub(crate) struct Summary {
     output: PathBuf,
     bytes: u64,
     triangles: u64,
@@ -179,10 +196,7 @@ impl Summary {
         })
     }
 
-    fn tell(&self, report: &BakeReport) {
-        if let Some(dropped) = report.header.counts.dropped() {
-            eprintln!("warning: left out triangles: {dropped}");
-        }
+    fn tell(&self) {
         eprintln!(
             "{}: {} triangles → {} surfels, {} points in {} cells, {}, {:.2} s",
             self.output.display(),

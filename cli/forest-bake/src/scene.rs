@@ -1,6 +1,7 @@
 //! `forest-bake scene`.
 
 use crate::failure::Usage;
+use crate::log::Log;
 use crate::output;
 use anyhow::Result;
 use forest_scene::{
@@ -61,7 +62,7 @@ pub(crate) struct Args {
     force: bool,
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     let path = match (&args.output, &args.packs[..]) {
         (None, [scene]) => PathBuf::from(scene),
         (None, _) => return Err(Usage("--plant takes one scene file".into()).into()),
@@ -79,7 +80,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     instances::write(&folder.join(table), &trees)?;
     // Whatever the packs have to say.
     let scene = Scene::open(&path)?;
-    if !quiet {
+    if log.says() {
         eprintln!("{}", describe(&path, &scene.land, &scene.trees));
     }
     Ok(())

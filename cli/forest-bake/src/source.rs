@@ -1,6 +1,7 @@
 //! Reading the block that a command works on.
 
-use anyhow::Result;
+use crate::log::Log;
+use anyhow::{Context, Result};
 use forest_import::{Block, Limits};
 use forest_pack::header::{Meta, Source};
 use forest_soup::TriangleSoup;
@@ -40,8 +41,8 @@ pub(crate) struct LoadedSource {
 
 impl SourceArgs {
     /// Reads and flattens; warnings go to stderr.
-    pub(crate) fn load(&self, quiet: bool) -> Result<LoadedSource> {
-        self.import.load(&self.trees, quiet)
+    pub(crate) fn load(&self, log: Log) -> Result<LoadedSource> {
+        self.import.load(&self.trees, log)
     }
 }
 
@@ -52,13 +53,11 @@ impl ImportArgs {
     }
 
     /// Reads and flattens `trees`; warnings go to stderr.
-    pub(crate) fn load(&self, trees: &[String], quiet: bool) -> Result<LoadedSource> {
+    pub(crate) fn load(&self, trees: &[String], log: Log) -> Result<LoadedSource> {
         let start = Instant::now();
         let block = Block::parse(trees)?;
         let loaded = block.load(&self.limits())?;
-        if !quiet {
-            loaded.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
-        }
+        loaded.warnings.iter().for_each(|w| log.warn(w));
         let sources: Vec<Source> = block
             .parts
             .iter()
@@ -70,7 +69,7 @@ impl ImportArgs {
             })
             .collect();
         let meta = meta(sources);
-        let soup = loaded.model.flatten(self.max_triangles)?;
+        let soup = loaded.model.flatten(self.max_triangles).with_context(|| trees.join(" "))?;
         let seconds = start.elapsed().as_secs_f64();
         Ok(LoadedSource { soup, meta, trees: block.parts.len(), seconds })
     }
@@ -88,6 +87,7 @@ pub(crate) fn meta(sources: Vec<Source>) -> Meta {
         generator: concat!("forest-bake ", env!("CARGO_PKG_VERSION")).into(),
         source_hash: *hasher.finalize().as_bytes(),
         sources,
+        options: Vec::new(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! `forest-bake verify`.
 
+use crate::log::Log;
 use crate::output;
 use anyhow::Result;
 use forest_foliage::{CrownLight, FoliageBlock, PointsWind};
@@ -19,11 +20,11 @@ pub(crate) struct Args {
 }
 
 /// Checks all packs; the first failure decides the exit code, the others are still named.
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     let mut first = None;
     for path in &args.packs {
         match check(path) {
-            Ok(()) if quiet => {}
+            Ok(()) if !log.says() => {}
             Ok(()) => output::print(&format!("{}: ok\n", path.display()))?,
             Err(e) if first.is_none() => first = Some(e),
             Err(e) => eprintln!("forest-bake: {e}"),

@@ -1,8 +1,9 @@
 //! `forest-bake views`.
 
 use crate::failure::Usage;
+use crate::log::Log;
 use crate::output;
-use crate::source::SourceArgs;
+use crate::source::{LoadedSource, SourceArgs};
 use crate::target;
 use anyhow::Result;
 use forest_draw::PointsSubject;
@@ -13,7 +14,7 @@ use forest_raster::{Buffers, CaptureScene, Subject, Surfaces};
 use forest_soup::TriangleSoup;
 use forest_views::{
     BakeReport, Channels, Directions, Dome, Fit, Frame, Layout, Quality, ViewsBlock, ViewsError,
-    ViewsOptions, bake,
+    ViewsOptions,
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -106,13 +107,23 @@ enum FitArg {
     Sphere,
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
-    let start = Instant::now();
-    let options = args.options()?;
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
+    args.check()?;
     if let Some(preview) = &args.preview {
         output::check_target(preview, "png")?;
     }
-    let source = args.source.load(quiet)?;
+    let source = args.source.load(log)?;
+    let summary = bake(args, &source, log)?;
+    if args.json {
+        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+    }
+    Ok(())
+}
+
+/// Bakes what was read.
+pub(crate) fn bake(args: &Args, source: &LoadedSource, log: Log) -> Result<Summary> {
+    let start = Instant::now();
+    let options = args.options()?;
     source.soup.validate()?;
     let kept = target::existing(&args.output, &source.meta, args.force)?;
     let frame = Frame::of(&source.soup, &options.directions, options.fit);
@@ -120,7 +131,7 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let prepare = Instant::now();
     let surfaces = Surfaces::new(&source.soup.materials, &source.soup.textures);
     let mut scene = CaptureScene::new(&source.soup, &surfaces);
-    let points = args.points(&source.soup, &scene, &frame, &options, quiet)?;
+    let points = args.points(&source.soup, &scene, &frame, &options, log)?;
     let points = points.as_ref().map(PointsBlock::open).transpose()?;
     let prepare = prepare.elapsed().as_secs_f64();
     let sky = Instant::now();
@@ -132,8 +143,9 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
     let subject: &dyn Subject = cut.as_ref().map_or(&scene as &dyn Subject, |c| c);
     let mut writer = PackWriter::create(&args.output)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
-    let bar = output::bar(u64::from(options.directions.count()), "views", quiet);
-    let report = bake(subject, &frame, &options, &mut writer, &|n| bar.set_position(n))?;
+    let bar = output::bar(u64::from(options.directions.count()), "views", log);
+    let report =
+        forest_views::bake(subject, &frame, &options, &mut writer, &|n| bar.set_position(n))?;
     bar.finish_and_clear();
     if let Some(pack) = &kept {
         let own = |kind| (kind::VIEWS_HEADER..=kind::VIEWS_SKY).contains(&kind);
@@ -144,15 +156,12 @@ pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
         let pack = Pack::open(&args.output)?;
         output::write_file(preview, &contact_sheet(&ViewsBlock::open(&pack)?)?)?;
     }
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = source.seconds + start.elapsed().as_secs_f64();
     let summary = Summary::new(args, &report, [source.seconds, prepare, sky, seconds])?;
-    if !quiet {
+    if log.says() {
         summary.tell();
     }
-    if args.json {
-        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
-    }
-    Ok(())
+    Ok(summary)
 }
 
 /// Triangles for each texel of a tile from which points are tried.
@@ -164,6 +173,11 @@ const SAME_RMSE: f64 = 0.03;
 const SAME_COVERAGE: f64 = 0.02;
 
 impl Args {
+    /// Whether its options make sense.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.options().map(|_| ())
+    }
+
     /// The pack of points to capture instead of the triangles, if there should be one.
     fn points(
         &self,
@@ -171,7 +185,7 @@ impl Args {
         scene: &CaptureScene,
         frame: &Frame,
         options: &ViewsOptions,
-        quiet: bool,
+        log: Log,
     ) -> Result<Option<Pack>> {
         let texels = f64::from(self.texels).powi(2);
         let many = soup.triangles.len() as f64 > TRIANGLES_A_TEXEL * texels;
@@ -206,7 +220,7 @@ impl Args {
             let block = PointsBlock::open(&pack)?;
             let subject = PointsSubject::new(&block);
             let [rmse, coverage] = difference(&subject, scene, frame, options);
-            if !quiet {
+            if log.says() {
                 eprintln!("points instead of triangles: RMSE {rmse:.4}, coverage {coverage:+.4}");
             }
             if rmse > SAME_RMSE || coverage.abs() > SAME_COVERAGE {
@@ -280,7 +294,7 @@ fn difference(a: &dyn Subject, b: &dyn Subject, frame: &Frame, options: &ViewsOp
 
 /// What was done, for people and programs.
 #[derive(Serialize)]
-struct Summary {
+pub(crate) struct Summary {
     output: PathBuf,
     bytes: u64,
     views: u32,

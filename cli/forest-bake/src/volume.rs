@@ -1,6 +1,7 @@
 //! `forest-bake volume`.
 
 use crate::failure::Usage;
+use crate::log::Log;
 use crate::output;
 use crate::source::{ImportArgs, LoadedSource, meta};
 use crate::target;
@@ -13,7 +14,7 @@ use forest_raster::Surfaces;
 use forest_soup::Photograph;
 use forest_volume::{
     BakeReport, Blank, Branching, Coarse, CodebookOptions, CodebookSize, Coding, Prune, Space,
-    Stand, TomographyOptions, Volume, VolumeBlock, VolumeOptions, bake,
+    Stand, TomographyOptions, Volume, VolumeBlock, VolumeOptions,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -189,66 +190,104 @@ pub(crate) fn stand(text: &str, cameras: u32) -> Result<Stand> {
 }
 
 /// What a volume is made of.
-enum Loaded {
+pub(crate) enum Loaded {
     Mesh(Box<LoadedSource>),
-    Capture { photographs: Vec<Photograph>, held_out: Vec<Photograph>, meta: header::Meta },
+    Capture(Box<LoadedCapture>),
 }
 
-pub(crate) fn run(args: &Args, quiet: bool) -> Result<()> {
+/// Photographs.
+pub(crate) struct LoadedCapture {
+    photographs: Vec<Photograph>,
+    held_out: Vec<Photograph>,
+    meta: header::Meta,
+    /// Time of reading.
+    seconds: f64,
+}
+
+impl Loaded {
+    /// What the pack will say of its source.
+    pub(crate) fn meta_mut(&mut self) -> &mut header::Meta {
+        match self {
+            Self::Mesh(mesh) => &mut mesh.meta,
+            Self::Capture(capture) => &mut capture.meta,
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.seconds,
+            Self::Capture(capture) => capture.seconds,
+        }
+    }
+}
+
+/// Whether a source is a capture, not a tree.
+pub(crate) fn is_capture(source: &str) -> bool {
+    let path = Path::new(source);
+    path.is_dir() || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
+}
+
+pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
+    args.check()?;
+    let source = args.load(log)?;
+    let summary = bake(args, &source, log)?;
+    if args.json {
+        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
+    }
+    Ok(())
+}
+
+/// Bakes what was read.
+pub(crate) fn bake(args: &Args, source: &Loaded, log: Log) -> Result<Summary> {
     let start = Instant::now();
     let options = args.options()?;
     let codebook = args.codebook.options()?;
     let stand = stand(&args.mesh.stand, args.mesh.cameras)?;
-    let source = args.load(quiet)?;
-    let import = start.elapsed().as_secs_f64();
-    let meta = match &source {
+    let import = source.seconds();
+    let meta = match source {
         Loaded::Mesh(mesh) => &mesh.meta,
-        Loaded::Capture { meta, .. } => meta,
+        Loaded::Capture(capture) => &capture.meta,
     };
     let kept = target::existing(&args.output, meta, args.force)?;
-    let (volume, held_out) = match &source {
+    let (volume, held_out) = match source {
         Loaded::Mesh(mesh) => {
             let surfaces = Surfaces::new(&mesh.soup.materials, &mesh.soup.textures);
-            let bar = output::bar(stand.directions().len() as u64, "cameras", quiet);
+            let bar = output::bar(stand.directions().len() as u64, "cameras", log);
             let tell = |n| bar.set_position(n);
             let volume = Volume::from_mesh(&mesh.soup, &surfaces, stand, &options, &tell)?;
             bar.finish_and_clear();
             (volume, &[][..])
         }
-        Loaded::Capture { photographs, held_out, .. } => {
+        Loaded::Capture(capture) => {
+            let LoadedCapture { photographs, held_out, .. } = &**capture;
             let tomography =
                 TomographyOptions { rounds: args.capture.rounds, ..TomographyOptions::default() };
             // Rounds on every level but the first three, and billboards.
             let rounds = options.levels.saturating_sub(2) * args.capture.rounds;
             let steps = u64::from(rounds) + photographs.len() as u64;
-            let bar = output::bar(steps, "rounds and cameras", quiet);
+            let bar = output::bar(steps, "rounds and cameras", log);
             let tell = |n| bar.set_position(n);
             let volume = Volume::from_photographs(photographs, &tomography, &options, &tell)?;
             bar.finish_and_clear();
-            if !quiet {
-                warn(photographs, &volume, &options);
-            }
+            warn(photographs, &volume, &options, log);
             (volume, &held_out[..])
         }
     };
     let mut writer = PackWriter::create(&args.output)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), meta)?;
-    let report = bake(&volume, codebook.as_ref(), &mut writer)?;
+    let report = forest_volume::bake(&volume, codebook.as_ref(), &mut writer)?;
     if let Some(pack) = &kept {
         let own = |kind| (kind::VOLUME_HEADER..=kind::VOLUME_ATLAS).contains(&kind);
         target::keep_others(&mut writer, pack, kind::VOLUME_HEADER, own)?;
     }
     writer.finish()?;
     let judged = judge(&args.output, held_out)?;
-    let seconds = [import, start.elapsed().as_secs_f64()];
+    let seconds = [import, import + start.elapsed().as_secs_f64()];
     let summary = Summary::new(args, &volume, &report, judged, seconds)?;
-    if !quiet {
+    if log.says() {
         summary.tell();
     }
-    if args.json {
-        output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
-    }
-    Ok(())
+    Ok(summary)
 }
 
 /// The pack beside photographs that it does not know; `None` without any.
@@ -269,56 +308,58 @@ const SUSPECT_LEAST: f64 = 0.1;
 const SUSPECT_ALL: f64 = 0.25;
 
 /// Says what is odd about a capture.
-fn warn(photographs: &[Photograph], volume: &Volume, options: &VolumeOptions) {
+fn warn(photographs: &[Photograph], volume: &Volume, options: &VolumeOptions, log: Log) {
     if volume.lattice.levels < options.levels {
         let (have, want) = (volume.lattice.levels, options.levels);
-        eprintln!("warning: the photographs' pixels hold {have} levels, not {want}");
+        log.warn(format!("the photographs' pixels hold {have} levels, not {want}"));
     }
     let Some(found) = &volume.report.tomography else { return };
     let mut sorted = found.residuals.clone();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[sorted.len() / 2];
     if median > SUSPECT_ALL {
-        eprintln!(
-            "warning: the mattes do not fit each other (median RMS {median:.3}; above {SUSPECT_ALL}): are \
+        log.warn(format!(
+            "the mattes do not fit each other (median RMS {median:.3}; above {SUSPECT_ALL}): are \
              poses and focal lengths right?"
-        );
+        ));
     }
     let limit = (SUSPECT * median).max(SUSPECT_LEAST);
     for (photo, residual) in photographs.iter().zip(&found.residuals) {
         if *residual > limit {
-            eprintln!(
-                "warning: {}: its matte is off by {residual:.3} (RMS; above {limit:.3}): is its pose right?",
+            log.warn(format!(
+                "{}: its matte is off by {residual:.3} (RMS; above {limit:.3}): is its pose right?",
                 photo.name
-            );
+            ));
         }
     }
 }
 
 impl Args {
-    fn load(&self, quiet: bool) -> Result<Loaded> {
-        let is_capture = |s: &str| {
-            let path = Path::new(s);
-            path.is_dir() || path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
-        };
+    /// Whether its options make sense.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.options()?;
+        self.codebook.options()?;
+        stand(&self.mesh.stand, self.mesh.cameras).map(|_| ())
+    }
+
+    pub(crate) fn load(&self, log: Log) -> Result<Loaded> {
+        let start = Instant::now();
         let [capture] = &self.source[..] else {
             if let Some(capture) = self.source.iter().find(|s| is_capture(s)) {
                 let problem = "a capture cannot be baked together with others";
                 return Err(Usage(format!("{capture}: {problem}")).into());
             }
-            return Ok(Loaded::Mesh(Box::new(self.import.load(&self.source, quiet)?)));
+            return Ok(Loaded::Mesh(Box::new(self.import.load(&self.source, log)?)));
         };
         if !is_capture(capture) {
-            return Ok(Loaded::Mesh(Box::new(self.import.load(&self.source, quiet)?)));
+            return Ok(Loaded::Mesh(Box::new(self.import.load(&self.source, log)?)));
         }
         let up = match self.capture.up {
             UpArg::Y => Up::Y,
             UpArg::Z => Up::Z,
         };
         let set = load_photographs(Path::new(capture), &self.import.limits(), up)?;
-        if !quiet {
-            set.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
-        }
+        set.warnings.iter().for_each(|w| log.warn(w));
         let count = set.photographs.len();
         if self.capture.hold_out as usize >= count {
             let n = self.capture.hold_out;
@@ -333,7 +374,8 @@ impl Args {
             n => format!("without {n} photographs"),
         };
         let source = Source { name: name.into_owned(), hash: set.hash, placement };
-        Ok(Loaded::Capture { photographs, held_out, meta: meta(vec![source]) })
+        let (meta, seconds) = (meta(vec![source]), start.elapsed().as_secs_f64());
+        Ok(Loaded::Capture(Box::new(LoadedCapture { photographs, held_out, meta, seconds })))
     }
 
     fn options(&self) -> Result<VolumeOptions> {
@@ -393,7 +435,7 @@ impl CodebookArgs {
 
 /// What was done, for people and programs.
 #[derive(Serialize)]
-struct Summary {
+pub(crate) struct Summary {
     output: PathBuf,
     bytes: u64,
     cameras: usize,

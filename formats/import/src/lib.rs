@@ -27,11 +27,13 @@ mod gltf;
 mod obj;
 mod photographs;
 mod picture;
+mod references;
 mod source;
 
 pub use block::{Block, LoadedBlock, Part};
 pub use error::ImportError;
 pub use photographs::{CaptureSet, Up, load_photographs, transforms_file};
+pub use references::references;
 pub use source::Limits;
 
 use forest_soup::Model;

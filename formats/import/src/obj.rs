@@ -205,7 +205,9 @@ impl MapOptions {
                 "s" => options.scale = [number(0, 1.0), number(1, 1.0)],
                 "o" => options.offset = [number(0, 0.0), number(1, 0.0)],
                 "bm" => {
-                    options.bumps = Some(number(0, 1.0)).filter(|s| s.is_finite()).unwrap_or(1.0)
+                    options.bumps = Some(number(0, 1.0))
+                        .filter(|s| s.abs() <= Relief::MOST_SCALE)
+                        .unwrap_or(1.0)
                 }
                 "clamp" if words.first() == Some(&"on") => options.wrap = Wrap::Clamp,
                 _ => {}
@@ -214,6 +216,11 @@ impl MapOptions {
         }
         (options, rest)
     }
+}
+
+/// The file name in the value of a map.
+pub(crate) fn picture_name(text: &str) -> &str {
+    MapOptions::parse(text).1
 }
 
 /// Whether a picture holds normals, not heights: its mean looks out of the surface, and heights are grey.
@@ -229,6 +236,8 @@ fn holds_normals(texture: &Texture) -> bool {
 struct Pictures {
     images: HashMap<String, DynamicImage>,
     textures: HashMap<(Option<String>, Option<String>, bool), u32>,
+    /// Of bump maps, by name and whether they are clamped, whether they hold normals.
+    verdicts: HashMap<(String, bool), bool>,
 }
 
 impl Pictures {
@@ -306,11 +315,21 @@ impl Pictures {
             return (None, plain);
         }
         let key = (Some(name.to_string()), None, options.wrap == Wrap::Clamp);
+        let judged = (name.to_string(), key.2);
+        if !sure && self.verdicts.get(&judged) == Some(&false) {
+            return (None, plain);
+        }
         let texture = match self.textures.get(&key) {
-            Some(&known) if sure || holds_normals(&textures[known as usize]) => known,
-            Some(_) => return (None, plain),
+            Some(&known) => {
+                let texture = &textures[known as usize];
+                let verdict = self.verdicts.entry(judged);
+                if !sure && !*verdict.or_insert_with(|| holds_normals(texture)) {
+                    return (None, plain);
+                }
+                known
+            }
             None => match self.texture(source, element, (key.0.clone(), None), options.wrap) {
-                Ok(texture) if sure || holds_normals(&texture) => {
+                Ok(texture) if sure || self.holds_normals(judged, &texture) => {
                     textures.push(Arc::new(texture));
                     let index = textures.len() as u32 - 1;
                     self.textures.insert(key, index);
@@ -324,6 +343,11 @@ impl Pictures {
             },
         };
         (Some(Relief { texture, scale: options.bumps }), others.unwrap_or(options))
+    }
+
+    /// Looks at a picture, and remembers.
+    fn holds_normals(&mut self, judged: (String, bool), texture: &Texture) -> bool {
+        *self.verdicts.entry(judged).or_insert_with(|| holds_normals(texture))
     }
 
     /// Colour of one image, alpha of the other.

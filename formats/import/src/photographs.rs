@@ -120,11 +120,7 @@ fn photograph(
     common: &Intrinsics,
     up: Up,
 ) -> Result<Photograph, ImportError> {
-    // As synthetic data sets do, names may lack their extension.
-    let mut name = frame.file_path.clone();
-    if Path::new(&name).extension().is_none_or(|e| e.len() > 4) {
-        name.push_str(".png");
-    }
+    let name = frame_file(&frame.file_path);
     let element = format!("frame {i} ({name})");
     let bytes = source.file(&element, &name)?;
     let image = picture::decode(source, &element, &bytes)?;
@@ -140,6 +136,14 @@ fn photograph(
     let camera = PhotoCamera { eye, right, up, forward: -back, optics, size };
     let pixels = rgba.pixels().map(|p| p.0).collect();
     Ok(Photograph { name: frame.file_path.clone(), camera, pixels })
+}
+
+/// The file that a frame names. As synthetic data sets do, names may lack their extension.
+pub(crate) fn frame_file(name: &str) -> String {
+    match Path::new(name).extension().is_none_or(|e| e.len() > 4) {
+        true => format!("{name}.png"),
+        false => name.into(),
+    }
 }
 
 /// Focal lengths and centres in sides of the image at most.

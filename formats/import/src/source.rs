@@ -75,9 +75,7 @@ impl Source {
 
     /// The bytes of a file named relative to this one.
     pub(crate) fn file(&mut self, element: &str, name: &str) -> Result<Vec<u8>, ImportError> {
-        // Names from Windows use backslashes.
-        let name: Cow<str> =
-            if name.contains('\\') { name.replace('\\', "/").into() } else { name.into() };
+        let name = plain(name);
         let relative = Path::new(&*name);
         let inside =
             relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
@@ -85,7 +83,7 @@ impl Source {
             let problem = format!("{name:?} is outside the file's folder (see --allow-outside)");
             return Err(self.invalid(element, problem));
         }
-        let path = self.path.parent().unwrap_or(Path::new("")).join(relative);
+        let path = resolved(&self.path, &name);
         let bytes = read(&path, self.limits).map_err(|e| match e {
             ImportError::Io { source, .. } => {
                 self.invalid(element, format!("cannot read {}: {source}", path.display()))
@@ -99,6 +97,16 @@ impl Source {
     pub(crate) fn finish(self) -> ([u8; 32], Vec<String>) {
         (*self.hasher.finalize().as_bytes(), self.warnings)
     }
+}
+
+/// Names from Windows use backslashes.
+fn plain(name: &str) -> Cow<'_, str> {
+    if name.contains('\\') { name.replace('\\', "/").into() } else { name.into() }
+}
+
+/// The place of a file that another one names.
+pub(crate) fn resolved(from: &Path, name: &str) -> PathBuf {
+    from.parent().unwrap_or(Path::new("")).join(&*plain(name))
 }
 
 fn read(path: &Path, limits: Limits) -> Result<Vec<u8>, ImportError> {

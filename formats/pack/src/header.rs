@@ -56,6 +56,8 @@ pub struct Meta {
     pub source_hash: [u8; 32],
     /// The sources, in the order given.
     pub sources: Vec<Source>,
+    /// The preset and options of `forest-bake all`; empty where representations were baked one by one.
+    pub options: Vec<String>,
 }
 
 /// One source file of a pack.

@@ -35,5 +35,5 @@ pub use kind::SectionId;
 pub use layout::{ALIGNMENT, Codec, VERSION};
 pub use reader::{Pack, Section};
 pub use spool::Spool;
-pub use whole::write_whole;
+pub use whole::{copy_whole, write_whole};
 pub use writer::{Compressed, PackWriter};
