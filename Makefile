@@ -18,7 +18,8 @@
 #   make picture  draw the README's picture anew
 #   make golden   write the golden packs anew, after a meant change of the format
 #   make samples  grow sample-data anew
-#   make fuzz     fuzz the pack reader for T seconds a target (default 60)
+#   make fuzz     fuzz all that reads files, for T seconds (default 60) or RUNS executions a target; adds to
+#                 tests/fuzz/executions.tsv
 #   make deny     licences, sources and bans by cargo-deny, if it is installed
 
 CARGO ?= cargo
@@ -206,9 +207,7 @@ samples: setup
 
 fuzz: setup
 	@command -v cargo-fuzz >/dev/null || $(CARGO) install cargo-fuzz --locked
-	cd tests/fuzz && for target in container sections; do mkdir -p found/$$target; \
-	  RUSTC_BOOTSTRAP=1 cargo fuzz run -s none $$target found/$$target corpus/$$target -- \
-	    -max_total_time=$(T) -max_len=65536 || exit 1; done
+	T=$(T) RUNS=$(RUNS) bash tests/fuzz/run.sh
 
 deny:
 	@command -v cargo-deny >/dev/null || { echo "cargo install cargo-deny --locked"; exit 1; }

@@ -1,31 +1,21 @@
 use crate::support::repo;
+use forest_tests::fuzz::TARGETS;
 use forest_tests::{golden, use_pack, with_section};
 
-fn corpus(target: &str) -> Vec<(String, Vec<u8>)> {
-    let folder = repo("tests/fuzz/corpus").join(target);
-    let mut files: Vec<_> = std::fs::read_dir(&folder)
-        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
-        .map(|e| e.unwrap().path())
-        .collect();
-    files.sort();
-    assert!(!files.is_empty(), "{} is empty", folder.display());
-    files.into_iter().map(|p| (p.display().to_string(), std::fs::read(&p).unwrap())).collect()
-}
-
+/// Crashes that fuzzing found are part of the corpus.
 #[test]
-fn container_corpus_ends_in_a_value_or_an_error() {
-    for (_, bytes) in corpus("container") {
-        let _ = use_pack(&bytes);
-    }
-}
-
-#[test]
-fn sections_corpus_ends_in_a_value_or_an_error() {
-    let golden = std::fs::read(golden::richest().path()).unwrap();
-    for (name, bytes) in corpus("sections") {
-        let Some((&which, data)) = bytes.split_first() else { panic!("{name} is empty") };
-        if let Some(pack) = with_section(&golden, which, data) {
-            let _ = use_pack(&pack);
+fn the_corpus_ends_in_values_or_errors() {
+    for target in &TARGETS {
+        let folder = repo("tests/fuzz/corpus").join(target.name);
+        let entries =
+            std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+        let mut files: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
+        files.sort();
+        assert!(!files.is_empty(), "{} is empty", folder.display());
+        for file in files {
+            let bytes = std::fs::read(&file).unwrap();
+            let ends = std::panic::catch_unwind(|| (target.run)(&bytes));
+            assert!(ends.is_ok(), "{}", file.display());
         }
     }
 }

@@ -1,11 +1,12 @@
 //! Threads, places and scales that must not matter.
 
 use crate::support::{arg, repo, succeed};
+use forest_import::{Block, Limits};
 use forest_pack::{SectionId, kind};
-use forest_points::{BakeOptions, PointsBlock};
-use forest_soup::{Instance, Material, Mesh, Model, Placement, TriangleSoup};
+use forest_points::{BakeOptions, GridChoice, PointsBlock};
+use forest_soup::{AlphaMode, Instance, Material, Mesh, Model, Placement, TriangleSoup};
 use forest_tests::soups::leaves;
-use forest_tests::{bake_bytes, open};
+use forest_tests::{bake_bytes, bake_model_bytes, open};
 use glam::{DQuat, DVec3};
 
 /// Cells, points and triangles: all that is drawn, without the header that places it.
@@ -117,4 +118,64 @@ fn scales_of_ten_to_the_six_agree_within_a_hundred_thousandth() {
             assert!((*a - *b).length() < 1e-5, "{scale}: cell {i}, {a} {b}");
         }
     }
+}
+
+/// A block of sample trees, of a mesh with colours, corners that are no numbers and doubled triangles, one
+/// placement mirrored.
+fn mixed_block() -> Model {
+    let sample = |name: &str, at: &str| format!("{}{at}", arg(&repo("sample-data").join(name)));
+    let parts = [
+        sample("shrub.obj", "@100000,3,0"),
+        sample("broadleaf_young.gltf", "@100004,3,1:yaw=70,scale=0.3"),
+        sample("shrub.obj", "@100000,3,2:yaw=20"),
+    ];
+    let mut model = Block::parse(&parts).unwrap().load(&Limits::default()).unwrap().model;
+    let leaf = leaves(300, 0.2, 9);
+    let mut odd = Mesh {
+        colors: (0..900).map(|i| [0.3, 0.8, 0.1, (i % 5) as f32 / 4.0]).collect(),
+        positions: leaf.positions,
+        triangles: leaf.triangles,
+        material: model.materials.len() as u16,
+        ..Mesh::default()
+    };
+    odd.positions[17].y = f32::NAN;
+    odd.triangles.extend_from_within(100..120);
+    model.materials.push(Material { alpha_mode: AlphaMode::Blend, ..Material::default() });
+    let mirror = DVec3::new(-1.0, 1.0, 1.0);
+    let at = DVec3::new(100_002.0, 3.0, 0.5);
+    let placement = Placement::from_trs(at, DQuat::from_rotation_y(1.0), mirror);
+    model.instances.push(Instance { mesh: model.meshes.len() as u32, placement });
+    model.meshes.push(odd);
+    model
+}
+
+#[test]
+fn blocks_baked_from_disk_are_those_baked_in_memory() {
+    let model = mixed_block();
+    let soup = model.clone().flatten(1 << 24).unwrap();
+    for options in [
+        BakeOptions::default(),
+        BakeOptions { grid: GridChoice::Fixed([1, 1, 1]), ..BakeOptions::default() },
+        BakeOptions {
+            grid: GridChoice::Fixed([9, 3, 17]),
+            triangles: false,
+            ..BakeOptions::default()
+        },
+    ] {
+        let (memory, in_memory) = bake_bytes(&soup, &options).unwrap();
+        let (disk, on_disk) = bake_model_bytes(model.clone(), &options).unwrap();
+        assert!(memory == disk, "{options:?}");
+        assert_eq!(in_memory.header.counts, on_disk.header.counts);
+        assert_eq!(
+            (on_disk.header.counts.non_finite, on_disk.header.counts.duplicate >= 20),
+            (1, true)
+        );
+    }
+    let nothing = Model { instances: model.instances[..0].to_vec(), ..model.clone() };
+    let error = bake_model_bytes(nothing, &BakeOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("no triangle"), "{error}");
+    let mut broken = model;
+    broken.meshes[0].triangles[3][1] = u32::MAX;
+    let error = bake_model_bytes(broken, &BakeOptions::default()).unwrap_err().to_string();
+    assert!(error.starts_with("invalid soup: mesh 0: a triangle uses vertices"), "{error}");
 }

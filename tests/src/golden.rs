@@ -1,7 +1,7 @@
 //! The golden packs: what they are made of. `make golden` writes them; tests only read them.
 
-use crate::soups::{leaves, small_tree, texture, textured};
-use crate::{bake_bytes, bake_foliage, bake_views, bake_volume, open};
+use crate::soups::{bumpy_tree, leaves, small_tree, texture, textured};
+use crate::{bake_bytes, bake_foliage, bake_views, bake_volume, merged, open};
 use forest_foliage::FoliageOptions;
 use forest_pack::measures::{Light, Measure, Measures};
 use forest_pack::{PackError, PackWriter, kind};
@@ -27,6 +27,8 @@ enum Content {
     Views(ViewsOptions),
     /// Foliage, and nothing else.
     Foliage(FoliageOptions),
+    /// Points and foliage, the points tied to its branches.
+    Tree(BakeOptions, FoliageOptions),
     /// A volume, and nothing else.
     Volume(VolumeOptions, CodebookOptions),
 }
@@ -55,6 +57,11 @@ impl Golden {
             }
             Content::Foliage(options) => {
                 bake_foliage(&self.soup, options).expect("a golden soup bakes").0
+            }
+            Content::Tree(points, foliage) => {
+                let points = bake_bytes(&self.soup, points).expect("a golden soup bakes").0;
+                let foliage = bake_foliage(&self.soup, foliage).expect("a golden soup bakes").0;
+                merged(&[foliage, points])
             }
             Content::Volume(options, codebook) => {
                 let stand = Stand::Dome { cameras: 5 };
@@ -134,6 +141,13 @@ pub fn all() -> Vec<Golden> {
         quality: Quality::Lossless,
         ..ViewsOptions::default()
     };
+    let foliage = FoliageOptions {
+        texel: Some(0.15),
+        levels: 2,
+        // Without blocks, as views.
+        blocks: false,
+        ..FoliageOptions::default()
+    };
     vec![
         points("textured.fpack", textured(leaves(150, 0.2, 1), leaf.clone(), mask), cut),
         points("vertex-colours.fpack", colored.clone(), cut),
@@ -155,18 +169,13 @@ pub fn all() -> Vec<Golden> {
         Golden {
             name: "foliage.fpack",
             soup: small_tree(),
-            content: Content::Foliage(FoliageOptions {
-                texel: Some(0.15),
-                levels: 2,
-                // Without blocks, as views.
-                blocks: false,
-                ..FoliageOptions::default()
-            }),
+            content: Content::Foliage(foliage.clone()),
         },
         Golden {
             name: "measured.fpack",
             soup: colored,
             content: Content::Points { options: cut, measured: true },
         },
+        Golden { name: "tree.fpack", soup: bumpy_tree(), content: Content::Tree(single, foliage) },
     ]
 }

@@ -1,5 +1,6 @@
 //! What tests, the golden packs and the fuzz targets share.
 
+pub mod fuzz;
 pub mod golden;
 pub mod landscapes;
 pub mod pictures;
@@ -21,7 +22,7 @@ use forest_points::{
     BakeError, BakeOptions, BakeReport, PixelArea, PointsBlock, Thresholds, bake, select,
 };
 use forest_raster::{CaptureScene, Sampling, Style, Surfaces};
-use forest_soup::{Camera, Projection, TriangleSoup};
+use forest_soup::{Camera, Model, Projection, TriangleSoup};
 use forest_views::{Frame, Lookup, ViewsBlock, ViewsError, ViewsOptions};
 use forest_volume::{
     Blending, CodebookOptions, Detail, Stand, Volume, VolumeBlock, VolumeError, VolumeOptions,
@@ -48,6 +49,23 @@ pub fn bake_bytes(
     let mut writer = PackWriter::create(&path)?;
     header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
     let report = bake(soup, options, &mut writer, &|_| {})?;
+    writer.finish()?;
+    Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+}
+
+/// [`bake_bytes`] of a model that is not flattened.
+///
+/// # Errors
+/// As [`forest_points::bake_model`].
+pub fn bake_model_bytes(
+    model: Model,
+    options: &BakeOptions,
+) -> Result<(Vec<u8>, BakeReport), BakeError> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
+    let report = forest_points::bake_model(model, 1 << 24, options, &mut writer, &|_| {})?;
     writer.finish()?;
     Ok((std::fs::read(&path).expect("the pack that was just written"), report))
 }

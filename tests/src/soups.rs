@@ -1,6 +1,6 @@
 //! Small soups of known shape.
 
-use forest_soup::{AlphaMode, Material, Texture, TriangleSoup, Wrap};
+use forest_soup::{AlphaMode, Material, Relief, Texture, TriangleSoup, Wrap};
 use glam::{Vec2, Vec3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
@@ -78,6 +78,16 @@ pub fn small_tree() -> TriangleSoup {
     soup.materials =
         vec![named("bark", [0.2, 0.12, 0.08, 1.0]), named("leaf", [0.1, 0.4, 0.05, 1.0])];
     soup.triangle_materials[wood..].fill(1);
+    soup
+}
+
+/// [`small_tree`] with bumps on its bark.
+pub fn bumpy_tree() -> TriangleSoup {
+    let tree = small_tree();
+    let bumps = texture(4, |x, y| [96 + 20 * x as u8, 96 + 20 * y as u8, 240, 255]);
+    let mut soup = textured(tree.clone(), bumps, AlphaMode::Opaque);
+    soup.materials = tree.materials;
+    soup.materials[0].relief = Some(Relief { texture: 0, scale: 0.8 });
     soup
 }
 

@@ -104,7 +104,7 @@ pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     done.exports = work.install(args.export_to.as_deref(), &args.output)?;
     done.output = args.output.clone();
     done.seconds = start.elapsed().as_secs_f64();
-    done.peak_bytes = work::peak_bytes();
+    done.peak_bytes = output::peak_bytes();
     if log.says() {
         let (name, bytes) = (done.output.display(), output::bytes(done.bytes));
         eprintln!("{name}: {bytes}, {} exports, {:.2} s", done.exports.len(), done.seconds);

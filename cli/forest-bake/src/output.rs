@@ -56,3 +56,11 @@ pub(crate) fn check_target(path: &Path, extension: &str) -> Result<()> {
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     forest_pack::write_whole(path, bytes).with_context(|| path.display().to_string())
 }
+
+/// Most memory that the program has held, in bytes, where the system tells.
+pub(crate) fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes * 1024)
+}

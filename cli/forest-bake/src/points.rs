@@ -2,12 +2,13 @@
 
 use crate::log::Log;
 use crate::output;
-use crate::source::{LoadedSource, PointsOptions, SourceArgs};
+use crate::source::{LoadedSource, PointsOptions, ReadSource, SourceArgs};
 use crate::target;
-use anyhow::Result;
-use forest_pack::header;
+use anyhow::{Context, Result};
+use forest_pack::header::{self, Meta};
 use forest_pack::{Pack, PackWriter, SectionId, kind};
 use forest_points::{BakeOptions, BakeReport, Order, RadiusRule};
+use forest_soup::TriangleSoup;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -60,9 +61,16 @@ enum Sorting {
     Paper,
 }
 
+/// Triangles that are baked in memory; more go through a file beside the pack.
+const IN_MEMORY: u64 = 8 << 20;
+
 pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
-    let source = args.source.load(log)?;
-    let summary = bake(args, &source, log)?;
+    let source = args.source.read(log)?;
+    let is_large = source.model.triangle_count() > IN_MEMORY;
+    let summary = match is_large && !args.measure {
+        true => bake_large(args, source, log)?,
+        false => bake(args, &source.flatten()?, log)?,
+    };
     if args.json {
         output::print(&format!("{}\n", serde_json::to_string_pretty(&summary)?))?;
     }
@@ -71,8 +79,43 @@ pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
 
 /// Bakes what was read.
 pub(crate) fn bake(args: &Args, source: &LoadedSource, log: Log) -> Result<Summary> {
+    let LoadedSource { soup, meta, trees, seconds } = source;
+    let block =
+        Source { meta, trees: *trees, triangles: soup.triangles.len() as u64, seconds: *seconds };
+    let measured = args.measure.then_some(soup);
+    write(args, &block, measured, log, |options, writer, progress| {
+        Ok(forest_points::bake(soup, options, writer, progress)?)
+    })
+}
+
+/// Bakes what does not fit in memory.
+fn bake_large(args: &Args, source: ReadSource, log: Log) -> Result<Summary> {
+    let ReadSource { model, meta, trees, max_triangles, name, seconds, .. } = source;
+    let block = Source { meta: &meta, trees, triangles: model.triangle_count(), seconds };
+    write(args, &block, None, log, |options, writer, progress| {
+        forest_points::bake_model(model, max_triangles, options, writer, progress).context(name)
+    })
+}
+
+/// What is told of a source.
+struct Source<'a> {
+    meta: &'a Meta,
+    trees: usize,
+    triangles: u64,
+    /// Time of reading it.
+    seconds: f64,
+}
+
+/// Writes the pack of what `make` bakes, and measures it against a soup.
+fn write(
+    args: &Args,
+    source: &Source,
+    measured_by: Option<&TriangleSoup>,
+    log: Log,
+    make: impl FnOnce(&BakeOptions, &mut PackWriter, &dyn Fn(u64)) -> Result<BakeReport>,
+) -> Result<Summary> {
     let start = Instant::now();
-    let kept = target::existing(&args.output, &source.meta, args.force)?;
+    let kept = target::existing(&args.output, source.meta, args.force)?;
     let options = args.bake_options(source.trees)?;
     let measured = |p: &Pack| p.contains(SectionId::new(kind::POINTS_CALIBRATION, 0));
     if kept.as_ref().is_some_and(measured) && !args.measure {
@@ -86,18 +129,17 @@ pub(crate) fn bake(args: &Args, source: &LoadedSource, log: Log) -> Result<Summa
         None => args.output.clone(),
     };
     let mut writer = PackWriter::create(&baked)?;
-    header::write(&mut writer, SectionId::new(kind::META, 0), &source.meta)?;
-    let bar = output::bar(source.soup.triangles.len() as u64, "points", log);
-    let report =
-        forest_points::bake(&source.soup, &options, &mut writer, &|done| bar.set_position(done))?;
+    header::write(&mut writer, SectionId::new(kind::META, 0), source.meta)?;
+    let bar = output::bar(source.triangles, "points", log);
+    let report = make(&options, &mut writer, &|done| bar.set_position(done))?;
     bar.finish_and_clear();
     if let Some(pack) = &kept {
         target::keep_others(&mut writer, pack, kind::POINTS_HEADER, |k| is_own(k, &options))?;
     }
     writer.finish()?;
     target::tie(&baked)?;
-    if args.measure {
-        crate::eval::measure(&baked, &args.output, &source.soup, log)?;
+    if let Some(soup) = measured_by {
+        crate::eval::measure(&baked, &args.output, soup, log)?;
     }
     if let Some(dropped) = report.header.counts.dropped() {
         log.warn(format!("left out triangles: {dropped}"));
@@ -158,6 +200,8 @@ pub(crate) struct Summary {
     bake_seconds: f64,
     /// Seconds by stage; those of parallel stages are summed over threads.
     stage_seconds: Vec<(&'static str, f64)>,
+    /// The most memory that was held at once, where the system tells.
+    peak_bytes: Option<u64>,
 }
 
 #[derive(Serialize)]
@@ -169,12 +213,7 @@ struct Dropped {
 }
 
 impl Summary {
-    fn new(
-        output: &Path,
-        source: &LoadedSource,
-        report: &BakeReport,
-        seconds: f64,
-    ) -> Result<Self> {
+    fn new(output: &Path, source: &Source, report: &BakeReport, seconds: f64) -> Result<Self> {
         let c = report.header.counts;
         Ok(Self {
             output: output.into(),
@@ -193,6 +232,7 @@ impl Summary {
             import_seconds: source.seconds,
             bake_seconds: seconds - source.seconds,
             stage_seconds: report.times.stages().map(|(n, t)| (n, t.seconds())).to_vec(),
+            peak_bytes: output::peak_bytes(),
         })
     }
 

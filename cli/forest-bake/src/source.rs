@@ -4,14 +4,14 @@ use crate::log::Log;
 use anyhow::{Context, Result};
 use forest_import::{Block, Limits};
 use forest_pack::header::{Meta, Source};
-use forest_soup::TriangleSoup;
+use forest_soup::{Model, TriangleSoup};
 use std::time::Instant;
 
 /// Which files, and what they may hold.
 #[derive(clap::Args)]
 pub(crate) struct SourceArgs {
     /// Trees: FILE, or FILE@x,y,z:yaw=DEGREES,scale=FACTOR for several placed together; or one
-    /// block file (.toml).
+    /// block file (.toml). The file - is standard input.
     #[arg(required = true, value_name = "TREE")]
     trees: Vec<String>,
     #[command(flatten)]
@@ -29,6 +29,21 @@ pub(crate) struct ImportArgs {
     allow_outside: bool,
 }
 
+/// A block, as its files hold it.
+pub(crate) struct ReadSource {
+    pub(crate) model: Model,
+    pub(crate) meta: Meta,
+    /// Trees in the block.
+    pub(crate) trees: usize,
+    /// Triangles that it may have.
+    pub(crate) max_triangles: u64,
+    /// The files, as they were named.
+    pub(crate) name: String,
+    start: Instant,
+    /// Time of reading.
+    pub(crate) seconds: f64,
+}
+
 /// A block, flattened.
 pub(crate) struct LoadedSource {
     pub(crate) soup: TriangleSoup,
@@ -44,6 +59,11 @@ impl SourceArgs {
     pub(crate) fn load(&self, log: Log) -> Result<LoadedSource> {
         self.import.load(&self.trees, log)
     }
+
+    /// Reads; warnings go to stderr.
+    pub(crate) fn read(&self, log: Log) -> Result<ReadSource> {
+        self.import.read(&self.trees, log)
+    }
 }
 
 impl ImportArgs {
@@ -54,6 +74,10 @@ impl ImportArgs {
 
     /// Reads and flattens `trees`; warnings go to stderr.
     pub(crate) fn load(&self, trees: &[String], log: Log) -> Result<LoadedSource> {
+        self.read(trees, log)?.flatten()
+    }
+
+    fn read(&self, trees: &[String], log: Log) -> Result<ReadSource> {
         let start = Instant::now();
         let block = Block::parse(trees)?;
         let loaded = block.load(&self.limits())?;
@@ -68,10 +92,24 @@ impl ImportArgs {
                 placement: part.placement_text(),
             })
             .collect();
-        let meta = meta(sources);
-        let soup = loaded.model.flatten(self.max_triangles).with_context(|| trees.join(" "))?;
-        let seconds = start.elapsed().as_secs_f64();
-        Ok(LoadedSource { soup, meta, trees: block.parts.len(), seconds })
+        Ok(ReadSource {
+            model: loaded.model,
+            meta: meta(sources),
+            trees: block.parts.len(),
+            max_triangles: self.max_triangles,
+            name: trees.join(" "),
+            start,
+            seconds: start.elapsed().as_secs_f64(),
+        })
+    }
+}
+
+impl ReadSource {
+    /// All trees as one soup.
+    pub(crate) fn flatten(self) -> Result<LoadedSource> {
+        let Self { model, meta, trees, name, .. } = self;
+        let soup = model.flatten(self.max_triangles).context(name)?;
+        Ok(LoadedSource { soup, meta, trees, seconds: self.start.elapsed().as_secs_f64() })
     }
 }
 

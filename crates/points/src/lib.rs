@@ -61,7 +61,7 @@ mod validate;
 
 pub use bake::audit::{CutAudit, audit};
 pub use bake::timing::{StageTimes, Stopwatch};
-pub use bake::{BakeError, BakeReport, bake};
+pub use bake::{BakeError, BakeReport, bake, bake_model};
 pub use block::PointsBlock;
 pub use calibration::Calibration;
 pub use header::{BakeCounts, CellRecord, PointsHeader};

@@ -152,6 +152,11 @@ pub fn validate(trees: &[Instance], species: usize) -> Result<(), String> {
 /// # Errors
 /// When the disk is full or the folder cannot be written.
 pub fn write(path: &Path, trees: &[Instance]) -> Result<(), SceneError> {
+    forest_pack::write_whole(path, &table(trees)).map_err(SceneError::io(path, "writing the trees"))
+}
+
+/// The bytes of a table.
+pub fn table(trees: &[Instance]) -> Vec<u8> {
     let records: &[u8] = bytemuck::cast_slice(trees);
     let mut bytes = Vec::with_capacity(HEADER + records.len());
     bytes.extend_from_slice(MAGIC);
@@ -161,7 +166,7 @@ pub fn write(path: &Path, trees: &[Instance]) -> Result<(), SceneError> {
     bytes.extend_from_slice(blake3::hash(records).as_bytes());
     bytes.extend_from_slice(&[0; 8]);
     bytes.extend_from_slice(records);
-    forest_pack::write_whole(path, &bytes).map_err(SceneError::io(path, "writing the trees"))
+    bytes
 }
 
 /// Reads a table and checks it for a scene with so many species.
@@ -169,8 +174,16 @@ pub fn write(path: &Path, trees: &[Instance]) -> Result<(), SceneError> {
 /// # Errors
 /// When it cannot be read, is damaged or breaks a rule.
 pub fn read(path: &Path, species: usize) -> Result<Vec<Instance>, SceneError> {
-    let wrong = |element: &str, problem: String| SceneError::invalid(path, element, problem);
     let bytes = std::fs::read(path).map_err(SceneError::io(path, "reading the trees"))?;
+    parse(path, &bytes, species)
+}
+
+/// Checks the bytes of a table; `path` stands for it in messages.
+///
+/// # Errors
+/// When it is damaged or breaks a rule.
+pub fn parse(path: &Path, bytes: &[u8], species: usize) -> Result<Vec<Instance>, SceneError> {
+    let wrong = |element: &str, problem: String| SceneError::invalid(path, element, problem);
     if bytes.len() < HEADER || &bytes[..8] != MAGIC {
         return Err(wrong("header", "is not a table of trees".into()));
     }

@@ -59,7 +59,7 @@ pub use instances::{Instance, MOST_SPECIES, STEPS, TILE, Tile};
 pub use land::{Land, MOST_POINTS};
 pub use need::{Fineness, SpeciesNeed, needs};
 pub use scatter::{MOST_TREES, Scatter};
-pub use scene::{Scene, open_land, plant, read_file, write_file};
+pub use scene::{Scene, open_land, parse_file, plant, read_file, write_file};
 pub use shade::{Casters, DEPTH_STEPS, DIFFUSE, HEIGHT_STEPS, LOWEST_LIGHT, OpacityMap, Texel};
 pub use sight::{Sight, Sky};
 pub use solve::{Solved, solve};

@@ -90,8 +90,16 @@ impl Scene {
 /// When it cannot be read, is no TOML of this schema, or breaks a rule.
 pub fn read_file(path: &Path) -> Result<SceneFile, SceneError> {
     let text = std::fs::read_to_string(path).map_err(SceneError::io(path, "reading the scene"))?;
+    parse_file(path, &text)
+}
+
+/// Checks the text of a scene file; `path` stands for it in messages.
+///
+/// # Errors
+/// When it is no TOML of this schema, or breaks a rule.
+pub fn parse_file(path: &Path, text: &str) -> Result<SceneFile, SceneError> {
     let file: SceneFile =
-        toml::from_str(&text).map_err(|e| SceneError::invalid(path, "scene", e))?;
+        toml::from_str(text).map_err(|e| SceneError::invalid(path, "scene", e))?;
     file.validate().map_err(|(key, problem)| SceneError::invalid(path, key, problem))?;
     Ok(file)
 }

@@ -93,21 +93,7 @@ impl Model {
     /// # Errors
     /// When there is no triangle, or more than `max_triangles`.
     pub fn flatten(self, max_triangles: u64) -> Result<TriangleSoup, FlattenError> {
-        let triangles = self.triangle_count();
-        if triangles > max_triangles {
-            let instances = self.instances.len();
-            return Err(FlattenError::TooManyTriangles {
-                triangles,
-                instances,
-                limit: max_triangles,
-            });
-        }
-        let Some(first) = self.instances.first().copied().filter(|_| triangles > 0) else {
-            return Err(FlattenError::Empty {
-                meshes: self.meshes.len(),
-                instances: self.instances.len(),
-            });
-        };
+        let layout = Layout::of(&self, max_triangles)?;
         let mesh_of = |i: &Instance| &self.meshes[i.mesh as usize];
         let vertices: u64 = self.instances.iter().map(|i| mesh_of(i).positions.len() as u64).sum();
         // Vertices that no triangle uses would be memory for nothing.
@@ -115,45 +101,88 @@ impl Model {
         if vertices > limit {
             return Err(FlattenError::TooManyVertices { vertices, limit });
         }
-        let any = |has: fn(&Mesh) -> bool| self.instances.iter().any(|i| has(mesh_of(i)));
-        let (with_normals, with_uvs, with_colors) = (
-            any(|m| !m.normals.is_empty()),
-            any(|m| !m.uvs.is_empty()),
-            any(|m| !m.colors.is_empty()),
-        );
-
-        let mut soup = TriangleSoup {
-            origin: first.placement.translation(),
-            positions: Vec::with_capacity(vertices as usize),
-            triangles: Vec::with_capacity(triangles as usize),
-            triangle_materials: Vec::with_capacity(triangles as usize),
-            ..TriangleSoup::default()
-        };
-        for instance in &self.instances {
-            let mesh = mesh_of(instance);
-            let base = soup.positions.len() as u32;
-            let offset = instance.placement.translation_from(&first.placement);
-            push_positions(&mut soup.positions, mesh, instance.placement.linear, offset);
-            if with_normals {
-                push_normals(&mut soup.normals, mesh, instance.placement.linear);
-            }
-            if with_uvs {
-                push_or_fill(&mut soup.uvs, &mesh.uvs, mesh.positions.len(), Vec2::ZERO);
-            }
-            if with_colors {
-                push_or_fill(&mut soup.colors, &mesh.colors, mesh.positions.len(), [1.0; 4]);
-            }
-            let flip = instance.placement.is_mirrored();
-            soup.triangles.extend(mesh.triangles.iter().map(|&[a, b, c]| {
-                let [b, c] = if flip { [c, b] } else { [b, c] };
-                [a + base, b + base, c + base]
-            }));
-            soup.triangle_materials
-                .extend(std::iter::repeat_n(mesh.material, mesh.triangles.len()));
-        }
+        let mut soup = layout.empty(vertices as usize, layout.triangles as usize);
+        self.instances.iter().for_each(|i| layout.append(&mut soup, mesh_of(i), &i.placement));
         soup.materials = self.materials;
         soup.textures = self.textures;
         Ok(soup)
+    }
+}
+
+/// What all instances of a model have in common in its soup.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    /// Where the soup's origin is.
+    first: Placement,
+    /// Triangles of all instances.
+    triangles: u64,
+    normals: bool,
+    uvs: bool,
+    colors: bool,
+}
+
+impl Layout {
+    pub(crate) fn of(model: &Model, max_triangles: u64) -> Result<Self, FlattenError> {
+        let triangles = model.triangle_count();
+        let instances = model.instances.len();
+        if triangles > max_triangles {
+            let limit = max_triangles;
+            return Err(FlattenError::TooManyTriangles { triangles, instances, limit });
+        }
+        let Some(first) = model.instances.first().filter(|_| triangles > 0) else {
+            return Err(FlattenError::Empty { meshes: model.meshes.len(), instances });
+        };
+        let any = |has: fn(&Mesh) -> bool| {
+            model.instances.iter().any(|i| has(&model.meshes[i.mesh as usize]))
+        };
+        Ok(Self {
+            first: first.placement,
+            triangles,
+            normals: any(|m| !m.normals.is_empty()),
+            uvs: any(|m| !m.uvs.is_empty()),
+            colors: any(|m| !m.colors.is_empty()),
+        })
+    }
+
+    /// World position of the soup's zero.
+    pub(crate) fn origin(&self) -> DVec3 {
+        self.first.translation()
+    }
+
+    /// A soup with room, without materials.
+    pub(crate) fn empty(&self, vertices: usize, triangles: usize) -> TriangleSoup {
+        TriangleSoup {
+            origin: self.origin(),
+            positions: Vec::with_capacity(vertices),
+            normals: Vec::with_capacity(if self.normals { vertices } else { 0 }),
+            uvs: Vec::with_capacity(if self.uvs { vertices } else { 0 }),
+            colors: Vec::with_capacity(if self.colors { vertices } else { 0 }),
+            triangles: Vec::with_capacity(triangles),
+            triangle_materials: Vec::with_capacity(triangles),
+            ..TriangleSoup::default()
+        }
+    }
+
+    /// Adds a mesh that stands at `placement`.
+    pub(crate) fn append(&self, soup: &mut TriangleSoup, mesh: &Mesh, placement: &Placement) {
+        let base = soup.positions.len() as u32;
+        let offset = placement.translation_from(&self.first);
+        push_positions(&mut soup.positions, mesh, placement.linear, offset);
+        if self.normals {
+            push_normals(&mut soup.normals, mesh, placement.linear);
+        }
+        if self.uvs {
+            push_or_fill(&mut soup.uvs, &mesh.uvs, mesh.positions.len(), Vec2::ZERO);
+        }
+        if self.colors {
+            push_or_fill(&mut soup.colors, &mesh.colors, mesh.positions.len(), [1.0; 4]);
+        }
+        let flip = placement.is_mirrored();
+        soup.triangles.extend(mesh.triangles.iter().map(|&[a, b, c]| {
+            let [b, c] = if flip { [c, b] } else { [b, c] };
+            [a + base, b + base, c + base]
+        }));
+        soup.triangle_materials.extend(std::iter::repeat_n(mesh.material, mesh.triangles.len()));
     }
 }
 

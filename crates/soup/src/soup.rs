@@ -1,6 +1,6 @@
 //! The flattened triangle soup.
 
-use crate::{Material, Texture};
+use crate::{Material, Model, Texture};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -94,26 +94,65 @@ impl TriangleSoup {
                 self.triangle_materials[t]
             ));
         }
-        for (i, material) in self.materials.iter().enumerate() {
-            if material.texture.is_some_and(|t| t as usize >= self.textures.len()) {
-                let t = self.textures.len();
-                return fail(format!("material {i} uses texture {:?} of {t}", material.texture));
-            }
-            if let Some(r) = material.relief
-                && !r.is_valid(self.textures.len())
-            {
-                let (t, n, scale) = (r.texture, self.textures.len(), r.scale);
-                return fail(format!("material {i} uses normal texture {t} of {n}, times {scale}"));
-            }
-        }
-        for texture in &self.textures {
-            let (w, h, have) = (texture.width, texture.height, texture.texels.len());
-            if w == 0 || h == 0 || have as u64 != u64::from(w) * u64::from(h) {
-                return fail(format!("texture {:?} is {w}×{h} with {have} texels", texture.name));
-            }
-        }
-        Ok(())
+        check_palette(&self.materials, &self.textures)
     }
+}
+
+impl Model {
+    /// Checks lengths, indices and references, as [`TriangleSoup::validate`] does.
+    ///
+    /// # Errors
+    /// The first broken rule, with the element and the limit.
+    pub fn validate(&self) -> Result<(), InvalidSoup> {
+        let fail = |m: String| Err(InvalidSoup(m));
+        for (i, mesh) in self.meshes.iter().enumerate() {
+            let n = mesh.positions.len();
+            for (name, len) in [
+                ("normals", mesh.normals.len()),
+                ("uvs", mesh.uvs.len()),
+                ("colors", mesh.colors.len()),
+            ] {
+                if len != 0 && len != n {
+                    return fail(format!("mesh {i}: {len} {name} for {n} positions"));
+                }
+            }
+            if let Some(t) = mesh.triangles.iter().find(|t| t.iter().any(|&v| v as usize >= n)) {
+                return fail(format!("mesh {i}: a triangle uses vertices {t:?} of {n}"));
+            }
+            let (material, m) = (mesh.material, self.materials.len());
+            if usize::from(material) >= m {
+                return fail(format!("mesh {i} uses material {material} of {m}"));
+            }
+        }
+        let m = self.meshes.len();
+        if let Some(i) = self.instances.iter().position(|i| i.mesh as usize >= m) {
+            return fail(format!("instance {i} is of mesh {} of {m}", self.instances[i].mesh));
+        }
+        check_palette(&self.materials, &self.textures)
+    }
+}
+
+fn check_palette(materials: &[Material], textures: &[Arc<Texture>]) -> Result<(), InvalidSoup> {
+    let fail = |m: String| Err(InvalidSoup(m));
+    for (i, material) in materials.iter().enumerate() {
+        if material.texture.is_some_and(|t| t as usize >= textures.len()) {
+            let t = textures.len();
+            return fail(format!("material {i} uses texture {:?} of {t}", material.texture));
+        }
+        if let Some(r) = material.relief
+            && !r.is_valid(textures.len())
+        {
+            let (t, n, scale) = (r.texture, textures.len(), r.scale);
+            return fail(format!("material {i} uses normal texture {t} of {n}, times {scale}"));
+        }
+    }
+    for texture in textures {
+        let (w, h, have) = (texture.width, texture.height, texture.texels.len());
+        if w == 0 || h == 0 || have as u64 != u64::from(w) * u64::from(h) {
+            return fail(format!("texture {:?} is {w}×{h} with {have} texels", texture.name));
+        }
+    }
+    Ok(())
 }
 
 /// An axis-aligned box in the soup's space.

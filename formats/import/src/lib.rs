@@ -23,6 +23,7 @@
 
 mod block;
 mod error;
+mod files;
 mod gltf;
 mod obj;
 mod photographs;
@@ -32,7 +33,8 @@ mod source;
 
 pub use block::{Block, LoadedBlock, Part};
 pub use error::ImportError;
-pub use photographs::{CaptureSet, Up, load_photographs, transforms_file};
+pub use files::Files;
+pub use photographs::{CaptureSet, Up, load_photographs, load_photographs_from, transforms_file};
 pub use references::references;
 pub use source::Limits;
 
@@ -51,14 +53,26 @@ pub struct Imported {
     pub warnings: Vec<String>,
 }
 
-/// Reads one tree; the format is told by the extension (`.glb`, `.gltf`, `.obj`).
+/// Reads one tree; the format is told by the extension (`.glb`, `.gltf`, `.obj`). The path `-` is standard
+/// input, whose format is told by how it begins.
 ///
 /// # Errors
 /// When a file cannot be read, breaks its format's rules, or needs what is not supported.
 pub fn load(path: &Path, limits: &Limits) -> Result<Imported, ImportError> {
-    let mut source = Source::open(path, *limits)?;
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let model = match extension.as_deref() {
+    if path == Path::new(source::STDIN) {
+        let given = Files::stdin(limits.file_bytes)?;
+        return load_from(&given, path, limits);
+    }
+    load_from(&Files::Disk, path, limits)
+}
+
+/// As [`load`], of files that may be in memory.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_from(files: &Files, path: &Path, limits: &Limits) -> Result<Imported, ImportError> {
+    let mut source = Source::open(files, path, *limits)?;
+    let model = match source.extension()?.as_deref() {
         Some("glb" | "gltf") => gltf::load(&mut source)?,
         Some("obj") => obj::load(&mut source)?,
         other => {

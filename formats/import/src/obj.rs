@@ -20,10 +20,9 @@ use std::sync::Arc;
 
 /// Reads an `.obj` and its material libraries.
 pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
-    let bytes =
-        lines::faces_only(&std::mem::take(&mut source.bytes)).map_err(|(line, index)| {
-            source.invalid(format!("line {line}"), format!("a face with the index {index:?}"))
-        })?;
+    let bytes = lines::faces_only(&source.bytes()?).map_err(|(line, index)| {
+        source.invalid(format!("line {line}"), format!("a face with the index {index:?}"))
+    })?;
     let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
     // The parser asks for material libraries while it reads: note what went wrong with them.
     let failed = RefCell::new(None);

@@ -5,7 +5,7 @@
 //! −z and y up. The matte is the image's alpha.
 
 use crate::source::{Limits, Source};
-use crate::{ImportError, picture};
+use crate::{Files, ImportError, picture};
 use forest_soup::{Distortion, Optics, PhotoCamera, Photograph};
 use glam::DVec3;
 use serde::Deserialize;
@@ -89,8 +89,21 @@ pub fn transforms_file(path: &Path) -> PathBuf {
 /// When a file cannot be read or breaks a rule: no alpha, a matrix that is no pose, intrinsics
 /// that are missing or do not fit the image; or a camera model that is not supported.
 pub fn load_photographs(path: &Path, limits: &Limits, up: Up) -> Result<CaptureSet, ImportError> {
-    let mut source = Source::open(&transforms_file(path), *limits)?;
-    let transforms: Transforms = serde_json::from_slice(&source.bytes)
+    load_photographs_from(&Files::Disk, &transforms_file(path), limits, up)
+}
+
+/// As [`load_photographs`], of the file `path`, and of files that may be in memory.
+///
+/// # Errors
+/// As [`load_photographs`].
+pub fn load_photographs_from(
+    files: &Files,
+    path: &Path,
+    limits: &Limits,
+    up: Up,
+) -> Result<CaptureSet, ImportError> {
+    let mut source = Source::open(files, path, *limits)?;
+    let transforms: Transforms = serde_json::from_slice(&source.bytes()?)
         .map_err(|e| source.invalid("file", format!("not a transforms.json: {e}")))?;
     if transforms.frames.is_empty() {
         return Err(source.invalid("frames", "there are none"));

@@ -28,18 +28,24 @@ pub(crate) fn decode(
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(side);
     limits.max_image_height = Some(side);
-    limits.max_alloc = Some(u64::from(side) * u64::from(side) * 8);
+    limits.max_alloc = Some((u64::from(side) * u64::from(side) * 8).min(source.left()));
     reader.limits(limits);
     let image = reader.decode().map_err(|e| match e {
         image::ImageError::Unsupported(e) => {
             source.unsupported(format!("{element}: an image that is not PNG, JPEG or WebP ({e})"))
         }
-        image::ImageError::Limits(e) => invalid(format!("{e} (at most {side} texels a side)")),
+        image::ImageError::Limits(e) => {
+            let left = source.left();
+            invalid(format!("{e} (at most {side} texels a side, and {left} bytes more)"))
+        }
         e => invalid(e.to_string()),
     })?;
     if image.width() == 0 || image.height() == 0 {
         return Err(invalid(format!("{}×{} texels", image.width(), image.height())));
     }
+    // As it was decoded, and as 8-bit RGBA.
+    let texels = u64::from(image.width()) * u64::from(image.height());
+    source.charge(element, image.as_bytes().len() as u64 + 4 * texels)?;
     Ok(image)
 }
 

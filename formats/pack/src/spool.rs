@@ -1,7 +1,9 @@
 //! A section that is still being written, while others are too.
 
 use crate::layout::{ENTRY_HASH, short};
+use crate::scratch::folder;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
 use tempfile::SpooledTempFile;
 
 /// Bytes kept in memory before a spool moves to a temporary file.
@@ -16,9 +18,10 @@ pub struct Spool {
 }
 
 impl Spool {
-    /// An empty section.
-    pub fn new() -> Self {
-        Self { file: SpooledTempFile::new(IN_MEMORY), hasher: blake3::Hasher::new(), length: 0 }
+    /// An empty section of the pack that will be `target`: what does not fit in memory lies in its folder.
+    pub fn beside(target: &Path) -> Self {
+        let file = SpooledTempFile::new_in(IN_MEMORY, folder(target));
+        Self { file, hasher: blake3::Hasher::new(), length: 0 }
     }
 
     /// Bytes so far.
@@ -41,12 +44,6 @@ impl Spool {
         self.file.seek(SeekFrom::Start(0))?;
         let copied = io::copy(&mut (&mut self.file).take(self.length), out)?;
         if copied == self.length { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
-    }
-}
-
-impl Default for Spool {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

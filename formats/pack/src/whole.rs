@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+use crate::scratch::folder;
 use std::fs::{DirEntry, File};
 use std::io::{Result, Write};
 use std::path::Path;
@@ -16,7 +17,7 @@ const LEFT: Duration = Duration::from_secs(10);
 /// A hidden file in the folder of `target`, to be renamed to it once it is whole. What programs left there that were
 /// killed is removed.
 pub(crate) fn beside(target: &Path) -> Result<NamedTempFile> {
-    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder(target);
     std::fs::read_dir(folder)?.flatten().for_each(|entry| remove_if_left(&entry));
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]

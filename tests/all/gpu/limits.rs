@@ -8,6 +8,7 @@ use forest_pack::Pack;
 use forest_points::Thresholds;
 use forest_raster::Light;
 use forest_soup::Camera;
+use forest_tests::fuzz::forged;
 use forest_tests::{golden, open, with_section};
 use forest_views::Lookup;
 use forest_volume::{Blending, Detail};
@@ -32,12 +33,7 @@ fn hostile_packs_end_in_an_error_or_a_picture() {
         entries.map(|e| std::fs::read(e.unwrap().path()).unwrap())
     };
     corpus("container").for_each(|bytes| take(&bytes));
-    let richest = std::fs::read(golden::richest().path()).unwrap();
-    for bytes in corpus("sections") {
-        if let Some(pack) = bytes.split_first().and_then(|(w, d)| with_section(&richest, *w, d)) {
-            take(&pack);
-        }
-    }
+    corpus("sections").filter_map(|bytes| forged(&bytes)).for_each(|pack| take(&pack));
     for golden in golden::all() {
         let bytes = std::fs::read(golden.path()).unwrap();
         take(&bytes);

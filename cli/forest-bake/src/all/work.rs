@@ -89,11 +89,3 @@ pub(super) fn stop_when_stdin_ends() {
         std::process::exit(130);
     });
 }
-
-/// Most memory that the program has held, in bytes, where the system tells.
-pub(super) fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kilobytes * 1024)
-}

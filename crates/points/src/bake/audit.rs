@@ -41,20 +41,21 @@ pub fn audit(
     options: &BakeOptions,
     ratio: f64,
 ) -> Result<Vec<CutAudit>, crate::BakeError> {
-    let ready = Preparation::new(soup, options)?;
+    let ready = Preparation::of_soup(soup, options)?;
+    let near = ready.cells.batch(0..ready.cells.len())?;
     let shader = ready.shader();
-    let cells: Vec<Vec<Sums>> = (0..ready.lists.len())
+    let cells: Vec<Vec<Sums>> = (0..ready.cells.len())
         .into_par_iter()
         .map_init(
             || SurfelMaker::new(&shader),
             |maker, c| {
-                let triangles = ready.lists.of(c);
+                let cell = near.cell(c);
                 let counts = &mut BakeCounts::default();
-                let (surfels, _) = ready.baker.surfels(triangles, maker, counts);
+                let (surfels, _) = ready.baker.surfels(&cell, maker, counts);
                 if surfels.is_empty() {
                     return vec![];
                 }
-                let quantiser = ready.baker.lattice.quantiser(ready.baker.bounds(triangles));
+                let quantiser = ready.baker.lattice.quantiser(cell.bounds(&ready.baker.frame));
                 let rules = ready.baker.rules(Leaves::Surfels(&surfels), quantiser);
                 let mut tree = Tree::with_parents();
                 cluster::build(&rules, &mut tree);

@@ -1,7 +1,8 @@
 //! Bakes one cell: triangles in, sorted records out.
 
+use crate::bake::cells::CellSoup;
 use crate::bake::cluster::{self, ClusterRules, Leaves, Tree};
-use crate::bake::encode::{TriangleColors, TriangleEncoder};
+use crate::bake::encode::{TriangleColors, TriangleEncoder, colors};
 use crate::bake::frame::BlockFrame;
 use crate::bake::lattice::{Lattice, Quantiser};
 use crate::bake::node::Node;
@@ -18,12 +19,11 @@ use hashbrown::hash_table::Entry;
 
 /// What all cells share.
 pub(crate) struct CellBaker<'a> {
-    pub(crate) soup: &'a TriangleSoup,
     pub(crate) frame: BlockFrame,
     pub(crate) lattice: Lattice,
     pub(crate) options: &'a BakeOptions,
     /// None to bake points only.
-    pub(crate) encoder: Option<TriangleEncoder<'a>>,
+    pub(crate) encoder: Option<TriangleEncoder>,
 }
 
 /// A finished cell.
@@ -44,32 +44,27 @@ pub(crate) struct Kept {
 }
 
 impl CellBaker<'_> {
-    /// The box around the content of a cell.
-    pub(crate) fn bounds(&self, triangles: &[u32]) -> Bounds {
-        let corners = triangles.iter().flat_map(|&t| self.soup.corners(t as usize));
-        corners.fold(Bounds::EMPTY, |b, p| b.with(self.frame.map(p)))
-    }
-
-    /// Bakes the cell that holds `triangles`; `None` if nothing of them is visible.
+    /// Bakes a cell; `None` if nothing of it is visible.
     pub(crate) fn bake(
         &self,
-        triangles: &[u32],
+        cell: &CellSoup,
         maker: &mut SurfelMaker,
         counts: &mut BakeCounts,
         times: &mut StageTimes,
     ) -> Option<BakedCell> {
-        let (surfels, kept) = times.surfels.time(|| self.surfels(triangles, maker, counts));
+        let (surfels, kept) = times.surfels.time(|| self.surfels(cell, maker, counts));
         if surfels.is_empty() {
             return None;
         }
-        let bounds = self.bounds(triangles);
+        let bounds = cell.bounds(&self.frame);
         let quantiser = self.lattice.quantiser(bounds);
         let rules = self.rules(Leaves::Surfels(&surfels), quantiser);
         let mut tree = Tree::default();
         let root = times.cluster.time(|| cluster::build(&rules, &mut tree).root);
         let points = times.sort.time(|| sort(&tree.records, self.options.order));
         counts.points += points.len() as u64;
-        let (triangles, colors) = times.triangles.time(|| self.triangles(kept, &quantiser));
+        let (triangles, colors) =
+            times.triangles.time(|| self.triangles(&cell.soup, kept, &quantiser));
         let surfels = surfels.len() as u32;
         Some(BakedCell { bounds, quantiser, root, points, triangles, colors, surfels })
     }
@@ -81,20 +76,21 @@ impl CellBaker<'_> {
 
     pub(crate) fn surfels(
         &self,
-        triangles: &[u32],
+        cell: &CellSoup,
         maker: &mut SurfelMaker,
         counts: &mut BakeCounts,
     ) -> (Vec<Surfel>, Vec<Kept>) {
+        let (soup, triangles) = (&*cell.soup, &*cell.list);
         let mut surfels = Vec::with_capacity(triangles.len());
         let mut kept = Vec::with_capacity(triangles.len());
         let mut seen = Seen::with_capacity(triangles.len());
         for &triangle in triangles {
             let i = triangle as usize;
-            if !seen.insert(self.soup, triangle) {
+            if !seen.insert(soup, triangle) {
                 counts.duplicate += 1;
                 continue;
             }
-            match maker.push(i, &mut surfels) {
+            match maker.push(soup, i, &mut surfels) {
                 Outcome::ZeroArea => counts.zero_area += 1,
                 Outcome::Transparent => counts.transparent += 1,
                 Outcome::Surfels(n) => {
@@ -110,15 +106,16 @@ impl CellBaker<'_> {
 
     fn triangles(
         &self,
+        soup: &TriangleSoup,
         mut kept: Vec<Kept>,
         quantiser: &Quantiser,
     ) -> (Vec<TriangleRecord>, Vec<TriangleColors>) {
         let Some(encoder) = &self.encoder else { return (Vec::new(), Vec::new()) };
         kept.sort_by_key(|k| std::cmp::Reverse(k.size));
-        let records =
-            kept.iter().map(|k| encoder.encode(k.triangle as usize, k.size, quantiser)).collect();
-        let colors = if encoder.has_colors() {
-            kept.iter().map(|k| encoder.colors(k.triangle as usize)).collect()
+        let record = |k: &Kept| encoder.encode(soup, k.triangle as usize, k.size, quantiser);
+        let records = kept.iter().map(record).collect();
+        let colors = if encoder.colors {
+            kept.iter().map(|k| colors(soup, k.triangle as usize)).collect()
         } else {
             Vec::new()
         };

@@ -1,6 +1,6 @@
 //! Normalised block space: the block's sphere becomes the unit ball, by a power of two.
 
-use forest_soup::{Bounds, TriangleSoup};
+use forest_soup::Bounds;
 use glam::DVec3;
 
 /// Maps soup positions to block space: `(p − center) · 2^−exponent`, in `f64`.
@@ -18,9 +18,8 @@ pub(crate) struct BlockFrame {
 }
 
 impl BlockFrame {
-    /// The frame of all finite triangles; `None` if there is none, or all are one point.
-    pub(crate) fn of(soup: &TriangleSoup) -> Option<Self> {
-        let bounds = soup.bounds();
+    /// The frame of what lies in a box; `None` if that is nothing, or one point.
+    pub(crate) fn of(bounds: Bounds) -> Option<Self> {
         let half = bounds.half_diagonal();
         if bounds.is_empty() || half == 0.0 {
             return None;

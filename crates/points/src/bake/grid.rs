@@ -3,11 +3,11 @@
 use crate::bake::frame::BlockFrame;
 use crate::options::GridChoice;
 use forest_soup::{Bounds, TriangleSoup};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Cells along x, y (up) and z.
-pub(crate) fn dimensions(choice: GridChoice, bounds: Bounds) -> [u32; 3] {
+fn dimensions(choice: GridChoice, bounds: Bounds) -> [u32; 3] {
     match choice {
         GridChoice::Fixed(n) => n.map(|n| n.max(1)),
         GridChoice::Budget(budget) => near_cubes(bounds.size(), budget.max(1)),
@@ -30,18 +30,42 @@ fn near_cubes(size: DVec3, budget: u32) -> [u32; 3] {
     }
 }
 
-/// Triangles by cell.
-pub(crate) struct CellLists {
+/// The cells of a block.
+pub(crate) struct Grid {
+    pub(crate) frame: BlockFrame,
     pub(crate) dims: [u32; 3],
-    /// Cell `c` holds `triangles[starts[c]..starts[c + 1]]`.
-    pub(crate) starts: Vec<u32>,
-    /// Triangle indices, ascending within a cell.
-    pub(crate) triangles: Vec<u32>,
-    /// Triangles left out because a corner is NaN or infinite.
-    pub(crate) non_finite: u64,
+    cells_per_unit: DVec3,
 }
 
-const NO_CELL: u32 = u32::MAX;
+/// The cell of a triangle of which a corner is NaN or infinite.
+pub(crate) const NO_CELL: u32 = u32::MAX;
+
+impl Grid {
+    pub(crate) fn new(frame: BlockFrame, choice: GridChoice) -> Self {
+        let dims = dimensions(choice, frame.bounds);
+        let size = frame.bounds.size();
+        let cells_per_unit = DVec3::from_array(std::array::from_fn(|a| {
+            if size[a] > 0.0 { f64::from(dims[a]) / size[a] } else { 0.0 }
+        }));
+        Self { frame, dims, cells_per_unit }
+    }
+
+    /// Cells in all.
+    pub(crate) fn len(&self) -> usize {
+        self.dims.iter().map(|&n| n as usize).product()
+    }
+
+    /// The cell of a triangle's centroid, or [`NO_CELL`].
+    pub(crate) fn cell_of(&self, corners: [Vec3; 3]) -> u32 {
+        if !corners.iter().all(|p| p.is_finite()) {
+            return NO_CELL;
+        }
+        let [a, b, c] = corners.map(|p| self.frame.map(p));
+        let at = (sum(a, b, c) / 3.0 - self.frame.bounds.min) * self.cells_per_unit;
+        let [x, y, z]: [u32; 3] = std::array::from_fn(|k| (at[k] as u32).min(self.dims[k] - 1));
+        (y * self.dims[2] + z) * self.dims[0] + x
+    }
+}
 
 /// a + b + c, rounded alike whatever the order: duplicates of a triangle must meet in one cell.
 fn sum(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
@@ -50,26 +74,21 @@ fn sum(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     low.min(c) + high.max(c) + middle
 }
 
+/// Triangles by cell.
+pub(crate) struct CellLists {
+    /// Cell `c` holds `triangles[starts[c]..starts[c + 1]]`.
+    pub(crate) starts: Vec<u32>,
+    /// Triangle indices, ascending within a cell.
+    pub(crate) triangles: Vec<u32>,
+    /// Triangles left out because a corner is NaN or infinite.
+    pub(crate) non_finite: u64,
+}
+
 impl CellLists {
     /// Sorts triangles into the cells of their centroids.
-    pub(crate) fn new(soup: &TriangleSoup, frame: &BlockFrame, choice: GridChoice) -> Self {
-        let dims = dimensions(choice, frame.bounds);
-        let cells = dims.iter().map(|&n| n as usize).product::<usize>();
-        let min = frame.bounds.min;
-        let size = frame.bounds.size();
-        let per_unit: DVec3 = DVec3::from_array(std::array::from_fn(|a| {
-            if size[a] > 0.0 { f64::from(dims[a]) / size[a] } else { 0.0 }
-        }));
-        let cell_of = |i: usize| {
-            let corners = soup.corners(i);
-            if !corners.iter().all(|p| p.is_finite()) {
-                return NO_CELL;
-            }
-            let [a, b, c] = corners.map(|p| frame.map(p));
-            let at = (sum(a, b, c) / 3.0 - min) * per_unit;
-            let [x, y, z]: [u32; 3] = std::array::from_fn(|k| (at[k] as u32).min(dims[k] - 1));
-            (y * dims[2] + z) * dims[0] + x
-        };
+    pub(crate) fn new(soup: &TriangleSoup, grid: &Grid) -> Self {
+        let cells = grid.len();
+        let cell_of = |i: usize| grid.cell_of(soup.corners(i));
         let of: Vec<u32> =
             (0..soup.triangles.len()).into_par_iter().with_min_len(1 << 14).map(cell_of).collect();
 
@@ -92,7 +111,7 @@ impl CellLists {
                 next[c as usize] += 1;
             }
         }
-        Self { dims, starts, triangles, non_finite }
+        Self { starts, triangles, non_finite }
     }
 
     pub(crate) fn len(&self) -> usize {

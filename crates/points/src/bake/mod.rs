@@ -2,6 +2,7 @@
 
 pub(crate) mod audit;
 mod cell;
+mod cells;
 mod cluster;
 mod encode;
 mod frame;
@@ -9,17 +10,20 @@ mod grid;
 mod lattice;
 mod node;
 mod principal;
+mod spill;
 mod surfel;
 pub(crate) mod timing;
 mod union;
 
 use crate::bake::cell::{BakedCell, CellBaker};
+use crate::bake::cells::Cells;
 use crate::bake::cluster::Leaves;
-use crate::bake::encode::TriangleEncoder;
+use crate::bake::encode::{Laid, TriangleEncoder};
 use crate::bake::frame::BlockFrame;
-use crate::bake::grid::CellLists;
+use crate::bake::grid::{CellLists, Grid};
 use crate::bake::lattice::Lattice;
 use crate::bake::node::Node;
+use crate::bake::spill::{Outline, Sorted, Spill};
 use crate::bake::surfel::{SurfelMaker, SurfelShader};
 use crate::bake::timing::StageTimes;
 use crate::header::{BakeCounts, CellRecord, PointsHeader};
@@ -28,10 +32,12 @@ use crate::options::{BakeOptions, Order};
 use crate::size::SizeCode;
 use crate::validate::MOST_CELLS;
 use forest_pack::{Codec, PackError, PackWriter, SectionId, Spool, header, kind};
-use forest_soup::{Bounds, InvalidSoup, TriangleSoup};
+use forest_soup::{Bounds, FlattenError, InvalidSoup, Material, Model, Texture, TriangleSoup};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Surfels (as estimated) whose cells are baked before they are written: bounds a bake's memory.
 const BATCH: f64 = (1u64 << 22) as f64;
@@ -46,6 +52,9 @@ pub enum BakeError {
     /// The soup breaks its own rules.
     #[error(transparent)]
     Soup(#[from] InvalidSoup),
+    /// The model cannot be laid out.
+    #[error(transparent)]
+    Model(#[from] FlattenError),
     /// No triangle is left.
     #[error("no visible triangle: {0}")]
     NothingVisible(BakeCounts),
@@ -91,21 +100,44 @@ pub fn bake(
     writer: &mut PackWriter,
     progress: &dyn Fn(u64),
 ) -> Result<BakeReport, BakeError> {
-    let ready = Preparation::new(soup, options)?;
+    run(Preparation::of_soup(soup, options)?, writer, progress)
+}
+
+/// As [`bake()`] of the flattened model, byte by byte, but in little memory: the model's triangles (at most
+/// `max_triangles`) go to a file in the folder of the pack, cell by cell, and come back some cells at a time.
+///
+/// # Errors
+/// As [`bake()`], and when the model has too many triangles or the file cannot be written.
+pub fn bake_model(
+    model: Model,
+    max_triangles: u64,
+    options: &BakeOptions,
+    writer: &mut PackWriter,
+    progress: &dyn Fn(u64),
+) -> Result<BakeReport, BakeError> {
+    let ready = Preparation::of_model(model, max_triangles, options, writer.path())?;
+    run(ready, writer, progress)
+}
+
+fn run(
+    ready: Preparation,
+    writer: &mut PackWriter,
+    progress: &dyn Fn(u64),
+) -> Result<BakeReport, BakeError> {
     let mut times = ready.times;
     let shader = times.shade.time(|| ready.shader());
-    let Preparation { frame, lists, baker, mut counts, .. } = ready;
+    let Preparation { grid, cells, baker, estimates, .. } = &ready;
+    let mut counts = ready.counts;
     let uv_ranges = baker.encoder.as_ref().map_or(vec![], |e| e.uv_ranges.clone());
 
-    let mut sections = Sections::default();
+    let mut sections = Sections::beside(writer.path());
     let mut done = 0u64;
-    let estimates: Vec<f64> =
-        (0..lists.len()).into_par_iter().map(|c| shader.estimate(lists.of(c))).collect();
     let estimate: f64 = estimates.iter().sum();
     if estimate > MOST_SURFELS {
         return Err(BakeError::TooManyPoints(estimate as u64));
     }
-    for batch in batches(&estimates) {
+    for batch in batches(estimates) {
+        let near = cells.batch(batch.clone())?;
         let baked: Vec<_> = batch
             .clone()
             .into_par_iter()
@@ -114,7 +146,7 @@ pub fn bake(
                 |maker, c| {
                     let mut counts = BakeCounts::default();
                     let mut times = StageTimes::default();
-                    let cell = baker.bake(lists.of(c), maker, &mut counts, &mut times);
+                    let cell = baker.bake(&near.cell(c), maker, &mut counts, &mut times);
                     (cell, counts, times)
                 },
             )
@@ -125,24 +157,25 @@ pub fn bake(
             if let Some(cell) = cell {
                 times.write.time(|| sections.push(c as u32, cell))?;
             }
-            done += lists.of(c).len() as u64;
+            done += cells.count(c);
             progress(done);
         }
     }
     if sections.cells.is_empty() {
         return Err(BakeError::NothingVisible(counts));
     }
-    counts.points += sections.push_top(&baker)?;
+    counts.points += sections.push_top(baker)?;
+    let (frame, options) = (grid.frame, baker.options);
     let header = PointsHeader {
-        origin: (soup.origin + frame.center).to_array(),
+        origin: (ready.origin + frame.center).to_array(),
         exponent: frame.exponent,
         step_exponent: baker.lattice.exponent,
         min: frame.bounds.min.to_array(),
         max: frame.bounds.max.to_array(),
-        grid: lists.dims,
+        grid: grid.dims,
         order: options.order,
         radius: options.radius,
-        surfel_size: shader.size(),
+        surfel_size: surfel::size(&frame, options),
         alpha_tolerance: options.alpha_tolerance,
         counts,
         uv_ranges,
@@ -151,7 +184,7 @@ pub fn bake(
     times.write.time(|| {
         sections.write(&header, writer)?;
         if options.triangles {
-            write_materials(writer, &soup.materials, &soup.textures)?;
+            write_materials(writer, &ready.materials, &ready.textures)?;
         }
         Ok::<_, BakeError>(())
     })?;
@@ -160,43 +193,129 @@ pub fn bake(
 
 /// What comes before the first cell.
 pub(crate) struct Preparation<'a> {
-    frame: BlockFrame,
-    pub(crate) lists: CellLists,
+    origin: DVec3,
+    materials: Vec<Material>,
+    textures: Vec<Arc<Texture>>,
+    vertex_alpha: bool,
+    grid: Grid,
+    pub(crate) cells: Cells<'a>,
     pub(crate) baker: CellBaker<'a>,
     pub(crate) counts: BakeCounts,
+    /// Surfels of each cell, from above.
+    estimates: Vec<f64>,
     times: StageTimes,
 }
 
 impl<'a> Preparation<'a> {
-    pub(crate) fn new(soup: &'a TriangleSoup, options: &'a BakeOptions) -> Result<Self, BakeError> {
+    pub(crate) fn of_soup(
+        soup: &'a TriangleSoup,
+        options: &'a BakeOptions,
+    ) -> Result<Self, BakeError> {
         check(options)?;
         soup.validate()?;
         let mut times = StageTimes::default();
         let mut counts =
             BakeCounts { source_triangles: soup.triangles.len() as u64, ..Default::default() };
-        let Some((frame, lists)) = times.grid.time(|| {
-            let frame = BlockFrame::of(soup)?;
-            Some((frame, CellLists::new(soup, &frame, options.grid)))
+        let Some((grid, lists)) = times.grid.time(|| {
+            let grid = Grid::new(BlockFrame::of(soup.bounds())?, options.grid);
+            let lists = CellLists::new(soup, &grid);
+            Some((grid, lists))
         }) else {
             return Err(BakeError::NothingVisible(count_unusable(soup, counts)));
         };
         counts.non_finite = lists.non_finite;
-        let encoder =
-            times.triangles.time(|| options.triangles.then(|| TriangleEncoder::new(soup, frame)));
-        let lattice = Lattice { exponent: 0 };
-        let mut baker = CellBaker { soup, frame, lattice, options, encoder };
-        baker.lattice = times.grid.time(|| {
-            let extents = (0..lists.len()).into_par_iter().map(|c| {
-                let b = baker.bounds(lists.of(c));
-                if b.is_empty() { 0.0 } else { b.size().max_element() }
-            });
-            Lattice::for_extent(extents.reduce(|| 0.0, f64::max))
+        let encoder = times.triangles.time(|| {
+            options.triangles.then(|| {
+                let laid = Laid::new(&soup.materials, &soup.textures);
+                let bounds = laid.uv_bounds(soup);
+                TriangleEncoder::new(grid.frame, laid, bounds, !soup.colors.is_empty())
+            })
         });
-        Ok(Self { frame, lists, baker, counts, times })
+        let size = surfel::size(&grid.frame, options);
+        let in_block = |t: u32| soup.corners(t as usize).map(|p| grid.frame.map(p));
+        let (widest, estimates) = times.grid.time(|| {
+            let of_cell = |c: usize| {
+                let cell = lists.of(c);
+                let corners = cell.iter().flat_map(|&t| in_block(t));
+                let bounds = corners.fold(Bounds::EMPTY, Bounds::with);
+                let widest = if cell.is_empty() { 0.0 } else { bounds.size().max_element() };
+                (widest, cell.iter().map(|&t| surfel::estimate(in_block(t), size)).sum::<f64>())
+            };
+            let of_cells: Vec<_> = (0..lists.len()).into_par_iter().map(of_cell).collect();
+            let widest = of_cells.iter().fold(0.0, |most: f64, (widest, _)| most.max(*widest));
+            (widest, of_cells.into_iter().map(|(_, estimate)| estimate).collect())
+        });
+        let lattice = Lattice::for_extent(widest);
+        Ok(Self {
+            origin: soup.origin,
+            materials: soup.materials.clone(),
+            textures: soup.textures.clone(),
+            vertex_alpha: soup.colors.par_iter().any(|c| c[3] != 1.0),
+            baker: CellBaker { frame: grid.frame, lattice, options, encoder },
+            grid,
+            cells: Cells::Memory { soup, lists },
+            counts,
+            estimates,
+            times,
+        })
     }
 
-    pub(crate) fn shader(&self) -> SurfelShader<'a> {
-        SurfelShader::new(self.baker.soup, self.frame, self.baker.options)
+    /// The triangles of `model` go to a file in the folder of `target`.
+    fn of_model(
+        model: Model,
+        max_triangles: u64,
+        options: &'a BakeOptions,
+        target: &Path,
+    ) -> Result<Self, BakeError> {
+        check(options)?;
+        model.validate()?;
+        let pieces = model.pieces(max_triangles)?;
+        let mut times = StageTimes::default();
+        let mut counts =
+            BakeCounts { source_triangles: model.triangle_count(), ..Default::default() };
+        let laid = Laid::new(&model.materials, &model.textures);
+        let outline = times.grid.time(|| Outline::of(&pieces, &laid));
+        let Some(frame) = BlockFrame::of(outline.bounds) else {
+            for k in 0..pieces.len() {
+                let soup = pieces.soup(k);
+                let piece = BakeCounts {
+                    source_triangles: soup.triangles.len() as u64,
+                    ..BakeCounts::default()
+                };
+                let unusable = count_unusable(&soup, piece);
+                counts.non_finite += unusable.non_finite;
+                counts.zero_area += unusable.zero_area;
+            }
+            return Err(BakeError::NothingVisible(counts));
+        };
+        let grid = Grid::new(frame, options.grid);
+        let size = surfel::size(&frame, options);
+        let mut sorted = times.grid.time(|| Sorted::of(&pieces, &grid, size));
+        counts.non_finite = sorted.non_finite;
+        let (estimates, widest) = (std::mem::take(&mut sorted.estimates), sorted.widest);
+        let spill = times.write.time(|| Spill::write(&pieces, sorted, target))?;
+        let encoder = options
+            .triangles
+            .then(|| TriangleEncoder::new(frame, laid, outline.uv_bounds, outline.colors));
+        let lattice = Lattice::for_extent(widest);
+        Ok(Self {
+            origin: pieces.origin(),
+            vertex_alpha: outline.vertex_alpha,
+            baker: CellBaker { frame, lattice, options, encoder },
+            grid,
+            cells: Cells::Disk(spill),
+            counts,
+            estimates,
+            times,
+            // The meshes are not needed any more.
+            materials: model.materials,
+            textures: model.textures,
+        })
+    }
+
+    pub(crate) fn shader(&self) -> SurfelShader<'_> {
+        let Self { materials, textures, grid, baker, .. } = self;
+        SurfelShader::new(materials, textures, self.vertex_alpha, grid.frame, baker.options)
     }
 }
 
@@ -251,7 +370,6 @@ fn batches(estimates: &[f64]) -> Vec<std::ops::Range<usize>> {
 }
 
 /// The sections as they grow.
-#[derive(Default)]
 struct Sections {
     cells: Vec<CellRecord>,
     roots: Vec<Node>,
@@ -264,6 +382,12 @@ struct Sections {
 }
 
 impl Sections {
+    fn beside(target: &Path) -> Self {
+        let [points, triangles, colors] = [(); 3].map(|()| Spool::beside(target));
+        let (cells, roots, bounds) = (Vec::new(), Vec::new(), Vec::new());
+        Self { cells, roots, bounds, points, triangles, colors, point_count: 0, triangle_count: 0 }
+    }
+
     fn push(&mut self, grid_index: u32, cell: BakedCell) -> Result<(), BakeError> {
         let center = cell.bounds.center();
         let record = CellRecord {

@@ -14,11 +14,12 @@ use self::slices::Slices;
 use crate::bake::frame::BlockFrame;
 use crate::options::{BakeOptions, SurfelSize};
 use crate::validate::SMALLEST_SURFEL;
-use forest_soup::{AlphaMode, Material, ShadedTexture, TriangleSoup};
+use forest_soup::{AlphaMode, Material, ShadedTexture, Texture, TriangleSoup};
 use glam::{DVec3, Vec2};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// A disc of the base point set, in block space.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +67,7 @@ const MASK_SAMPLES: u32 = 7;
 
 /// What surfels are made with: shaded textures and limits. Shared by all threads.
 pub(crate) struct SurfelShader<'a> {
-    soup: &'a TriangleSoup,
+    materials: &'a [Material],
     frame: BlockFrame,
     shades: Vec<Shade>,
     /// Square root of the area of a translucent piece, in block units.
@@ -84,13 +85,18 @@ struct Shade {
 }
 
 impl<'a> SurfelShader<'a> {
-    pub(crate) fn new(soup: &'a TriangleSoup, frame: BlockFrame, options: &BakeOptions) -> Self {
-        let vertex_alpha = soup.colors.par_iter().any(|c| c[3] != 1.0);
-        let shades = soup
-            .materials
+    /// `vertex_alpha` says whether vertices may be translucent.
+    pub(crate) fn new(
+        materials: &'a [Material],
+        textures: &[Arc<Texture>],
+        vertex_alpha: bool,
+        frame: BlockFrame,
+        options: &BakeOptions,
+    ) -> Self {
+        let shades = materials
             .par_iter()
             .map(|m| {
-                let texture = m.texture.map(|t| &*soup.textures[t as usize]);
+                let texture = m.texture.map(|t| &*textures[t as usize]);
                 let shaded = texture.map(|t| ShadedTexture::new(t, m));
                 let masked = matches!(m.alpha_mode, AlphaMode::Mask { .. });
                 let raw = texture.filter(|_| masked && vertex_alpha).map(|t| {
@@ -106,32 +112,27 @@ impl<'a> SurfelShader<'a> {
                 }
             })
             .collect();
-        let size = match options.surfel_size {
-            SurfelSize::Auto => {
-                let b = frame.bounds.size();
-                (b.y / 256.0).max(b.length() / 4096.0)
-            }
-            SurfelSize::Triangle => f64::INFINITY,
-            SurfelSize::Units(s) => frame.length(s).max(SMALLEST_SURFEL),
-        };
-        Self { soup, frame, shades, size, tolerance: options.alpha_tolerance }
+        let size = size(&frame, options);
+        Self { materials, frame, shades, size, tolerance: options.alpha_tolerance }
     }
+}
 
-    /// Surfels that the triangles will make, roughly and from above.
-    pub(crate) fn estimate(&self, triangles: &[u32]) -> f64 {
-        let most = f64::from(1u32 << MAX_DEPTH);
-        let one = |&t: &u32| {
-            let [a, b, c] = self.soup.corners(t as usize).map(|p| self.frame.map(p));
-            let area = 0.5 * (b - a).cross(c - a).length();
-            1.0 + (2.0 * area / (self.size * self.size)).min(most)
-        };
-        triangles.iter().map(one).sum()
+/// The surfel size, in block units; infinite for one surfel a triangle.
+pub(crate) fn size(frame: &BlockFrame, options: &BakeOptions) -> f64 {
+    match options.surfel_size {
+        SurfelSize::Auto => {
+            let b = frame.bounds.size();
+            (b.y / 256.0).max(b.length() / 4096.0)
+        }
+        SurfelSize::Triangle => f64::INFINITY,
+        SurfelSize::Units(s) => frame.length(s).max(SMALLEST_SURFEL),
     }
+}
 
-    /// The surfel size, in block units; infinite for one surfel a triangle.
-    pub(crate) fn size(&self) -> f64 {
-        self.size
-    }
+/// Surfels of a size that a triangle in block space will make, roughly and from above.
+pub(crate) fn estimate([a, b, c]: [DVec3; 3], size: f64) -> f64 {
+    let area = 0.5 * (b - a).cross(c - a).length();
+    1.0 + (2.0 * area / (size * size)).min(f64::from(1u32 << MAX_DEPTH))
 }
 
 /// What became of a triangle.
@@ -185,10 +186,10 @@ impl<'a> SurfelMaker<'a> {
         Self { shader, cache: vec![None; CACHE_SLOTS] }
     }
 
-    /// Appends the surfels of triangle `i`, whose corners are finite.
-    pub(crate) fn push(&mut self, i: usize, out: &mut Vec<Surfel>) -> Outcome {
+    /// Appends the surfels of triangle `i` of `soup`, whose corners are finite.
+    pub(crate) fn push(&mut self, soup: &TriangleSoup, i: usize, out: &mut Vec<Surfel>) -> Outcome {
         let s = self.shader;
-        let corners = s.soup.corners(i).map(|p| s.frame.map(p));
+        let corners = soup.corners(i).map(|p| s.frame.map(p));
         let [a, b, c] = corners;
         let normal = (b - a).cross(c - a);
         let area = 0.5 * normal.length();
@@ -196,17 +197,18 @@ impl<'a> SurfelMaker<'a> {
             return Outcome::ZeroArea;
         }
         let axis = (normal / (2.0 * area)).as_vec3().to_array();
-        let material = s.soup.triangle_materials[i];
+        let material = soup.triangle_materials[i];
         let shade = &s.shades[material as usize];
         let edges = [a.distance_squared(b), b.distance_squared(c), c.distance_squared(a)];
-        let pieces = self.pieces(i, material, shade, edges, area);
-        let colors = vertex_colors(s.soup, i);
+        let uv = triangle_uv(soup, i);
+        let pieces = self.pieces(uv, material, shade, edges, area);
+        let colors = vertex_colors(soup, i);
         let shares: f32 = pieces.list().iter().map(|p| p.area).sum();
         let largest = (area / f64::from(shares)) as f32;
         let before = out.len();
         for piece in pieces.list() {
             let [u, v] = piece.at.map(f64::from);
-            let rgba = colors.map_or(piece.rgba, |k| tint(piece, &k, s, i));
+            let rgba = colors.map_or(piece.rgba, |k| tint(piece, &k, s, material, uv));
             if rgba[3] > 0.0 {
                 let position = (a + (b - a) * u + (c - a) * v).as_vec3().to_array();
                 let rgb = std::array::from_fn(|k| rgba[k] / rgba[3]);
@@ -222,14 +224,13 @@ impl<'a> SurfelMaker<'a> {
 
     fn pieces(
         &mut self,
-        i: usize,
+        uv: [Vec2; 3],
         material: u16,
         shade: &Shade,
         edges: [f64; 3],
         area: f64,
     ) -> Pieces {
         let size = self.shader.size;
-        let uv = triangle_uv(self.shader.soup, i);
         let Some(texture) = shade.texture.as_ref().filter(|_| shade.translucent) else {
             let rgba = |uv, samples| match &shade.texture {
                 Some(texture) => texture.integrate(uv, samples),
@@ -425,7 +426,13 @@ fn vertex_colors(soup: &TriangleSoup, i: usize) -> Option<[[f32; 4]; 3]> {
 
 /// A piece's colour under vertex colours, which are taken at its centroid. Under a mask, vertex
 /// alpha moves the cutoff: the piece's coverage is then counted anew, sample by sample.
-fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f32; 4] {
+fn tint(
+    piece: &Piece,
+    colors: &[[f32; 4]; 3],
+    s: &SurfelShader,
+    material: u16,
+    uv: [Vec2; 3],
+) -> [f32; 4] {
     let color_at = |[u, v]: [f32; 2]| -> [f32; 4] {
         std::array::from_fn(|k| {
             let c = colors[0][k] * (1.0 - u - v) + colors[1][k] * u + colors[2][k] * v;
@@ -433,8 +440,8 @@ fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f
         })
     };
     let color = color_at(piece.at);
-    let index = s.soup.triangle_materials[i] as usize;
-    let material = &s.soup.materials[index];
+    let index = usize::from(material);
+    let material = &s.materials[index];
     let opaque = colors.iter().all(|c| c[3] >= 1.0);
     let coverage = match (material.alpha_mode, &s.shades[index].raw) {
         (AlphaMode::Opaque, _) => piece.rgba[3],
@@ -443,7 +450,6 @@ fn tint(piece: &Piece, colors: &[[f32; 4]; 3], s: &SurfelShader, i: usize) -> [f
         // Of a mask without texture all or nothing passes.
         (AlphaMode::Mask { .. }, None) => material.coverage(1.0, color[3]),
         (AlphaMode::Mask { cutoff }, Some(raw)) => {
-            let uv = triangle_uv(s.soup, i);
             let mut inside = 0u32;
             bisect(piece.part, [2.0, 1.0, 1.0], MASK_SAMPLES, &mut |w| {
                 let at = (w[0] + w[1] + w[2]) / 3.0;

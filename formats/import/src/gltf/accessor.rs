@@ -10,7 +10,7 @@ use gltf::json::{Index, Root};
 
 /// Reads accessors of one file.
 pub(crate) struct Reader<'a> {
-    pub(crate) source: &'a Source,
+    pub(crate) source: &'a Source<'a>,
     pub(crate) root: &'a Root,
     pub(crate) buffers: &'a Buffers,
 }
@@ -26,20 +26,20 @@ struct Layout {
 }
 
 impl Reader<'_> {
-    /// Elements of `N` numbers; `kinds` are the accessor types that may be read as such (missing
-    /// components stay as in `fill`).
-    pub(crate) fn numbers<const N: usize>(
+    /// What `made` makes of elements of `N` numbers; `kinds` are the accessor types that may be read as such
+    /// (missing components stay as in `fill`).
+    pub(crate) fn numbers<const N: usize, T>(
         &self,
         element: &str,
         index: Index<Accessor>,
         kinds: &[Type],
         fill: [f64; N],
-    ) -> Result<Vec<[f64; N]>, ImportError> {
-        let mut out = Vec::new();
-        self.read(element, index, kinds, |values| {
+        made: impl Fn([f64; N]) -> T,
+    ) -> Result<Vec<T>, ImportError> {
+        let mut out = self.read(element, index, kinds, |values| {
             let mut v = fill;
             v.iter_mut().zip(values).for_each(|(v, x)| *v = x);
-            out.push(v);
+            made(v)
         })?;
         let sparse = self.sparse(element, index)?;
         if let Some((at, values)) = sparse {
@@ -50,7 +50,7 @@ impl Reader<'_> {
                 })?;
                 let mut v = fill;
                 v.iter_mut().zip(values(i)?).for_each(|(v, x)| *v = x);
-                *slot = v;
+                *slot = made(v);
             }
         }
         Ok(out)
@@ -71,8 +71,7 @@ impl Reader<'_> {
             return Err(self.source.invalid(element, problem));
         }
         // Every u32 is exact in an f64.
-        let values = self.numbers::<1>(element, index, &[Type::Scalar], [0.0])?;
-        Ok(values.into_iter().map(|[v]| v as u32).collect())
+        self.numbers(element, index, &[Type::Scalar], [0.0], |[v]| v as u32)
     }
 
     fn accessor(&self, element: &str, index: Index<Accessor>) -> Result<&Accessor, ImportError> {
@@ -84,13 +83,13 @@ impl Reader<'_> {
             .ok_or_else(|| missing(self.source, element, "accessor", at, count))
     }
 
-    fn read(
+    fn read<T>(
         &self,
         element: &str,
         index: Index<Accessor>,
         kinds: &[Type],
-        mut each: impl FnMut(Components),
-    ) -> Result<(), ImportError> {
+        each: impl Fn(Components) -> T,
+    ) -> Result<Vec<T>, ImportError> {
         let element = format!("{element}, accessor {}", index.value());
         let accessor = self.accessor(&element, index)?;
         let (Checked::Valid(component), Checked::Valid(kind)) =
@@ -111,9 +110,9 @@ impl Reader<'_> {
                 let problem = format!("{count} elements without a bufferView");
                 return Err(self.source.invalid(element, problem));
             }
+            self.source.charge(&element, (count * size_of::<T>()) as u64)?;
             let zeros = [0u8; 64];
-            (0..count).for_each(|_| each(Components::zeros(&zeros, components)));
-            return Ok(());
+            return Ok((0..count).map(|_| each(Components::zeros(&zeros, components))).collect());
         };
         let view = self.buffers.view(self.source, self.root, view_index.value())?;
         let layout = Layout {
@@ -125,10 +124,8 @@ impl Reader<'_> {
             normalized: accessor.normalized,
         };
         layout.check(&view.bytes).map_err(|problem| self.source.invalid(&element, problem))?;
-        for i in 0..count {
-            each(layout.element(&view.bytes, i));
-        }
-        Ok(())
+        self.source.charge(&element, count as u64 * size_of::<T>() as u64)?;
+        Ok((0..count).map(|i| each(layout.element(&view.bytes, i))).collect())
     }
 
     /// Sparse indices and a function to the values.

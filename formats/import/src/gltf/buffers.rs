@@ -2,17 +2,31 @@
 
 use super::missing;
 use crate::ImportError;
+use crate::files::Content;
 use crate::source::Source;
 use gltf::json::{Root, buffer::View};
 use serde::Deserialize;
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// Decoded elements of one compressed view; bounds what a hostile file can make us allocate.
 const MAX_ELEMENTS: usize = 1 << 28;
 
-/// All buffers, in memory. A buffer that is only a fallback of compressed views may be absent.
+/// All buffers. One that is only a fallback of compressed views may be absent.
 pub(crate) struct Buffers {
-    data: Vec<Option<Vec<u8>>>,
+    data: Vec<Option<Part>>,
+}
+
+/// A part of a file.
+pub(crate) struct Part {
+    pub(crate) content: Content,
+    pub(crate) range: Range<u64>,
+}
+
+impl Part {
+    fn len(&self) -> u64 {
+        self.range.end - self.range.start
+    }
 }
 
 /// A view's bytes and, if it has one, its stride.
@@ -25,19 +39,23 @@ impl Buffers {
     pub(crate) fn read(
         source: &mut Source,
         root: &Root,
-        blob: Option<Vec<u8>>,
+        blob: Option<Part>,
     ) -> Result<Self, ImportError> {
         let mut blob = blob;
         let mut data = Vec::new();
         for (i, buffer) in root.buffers.iter().enumerate() {
             let element = format!("buffer {i}");
             let bytes = match (&buffer.uri, i) {
-                (Some(uri), _) => Some(source.uri(&element, uri)?),
+                (Some(uri), _) => {
+                    let content = source.uri(&element, uri)?;
+                    let range = 0..content.len();
+                    Some(Part { content, range })
+                }
                 (None, 0) => blob.take(),
                 (None, _) => None,
             };
             if let Some(bytes) = &bytes
-                && (bytes.len() as u64) < buffer.byte_length.0
+                && bytes.len() < buffer.byte_length.0
             {
                 let problem =
                     format!("{} bytes; byteLength says {}", bytes.len(), buffer.byte_length.0);
@@ -67,14 +85,14 @@ impl Buffers {
                 packed.byte_offset,
                 packed.byte_length,
             )?;
-            let bytes = packed.decode(source, &element, bytes)?;
+            let bytes = packed.decode(source, &element, &bytes)?;
             return Ok(ViewBytes { bytes: bytes.into(), stride: Some(packed.byte_stride) });
         }
         let offset = view.byte_offset.map_or(0, |o| o.0 as usize);
         let bytes =
             self.slice(source, &element, view.buffer.value(), offset, view.byte_length.0 as usize)?;
         let stride = view.byte_stride.map(|s| s.0);
-        Ok(ViewBytes { bytes: bytes.into(), stride })
+        Ok(ViewBytes { bytes, stride })
     }
 
     fn slice(
@@ -84,7 +102,7 @@ impl Buffers {
         buffer: usize,
         offset: usize,
         length: usize,
-    ) -> Result<&[u8], ImportError> {
+    ) -> Result<Cow<'_, [u8]>, ImportError> {
         let count = self.data.len();
         let data = self
             .data
@@ -93,10 +111,16 @@ impl Buffers {
         let Some(data) = data else {
             return Err(source.invalid(element, format!("buffer {buffer} has no data")));
         };
-        offset.checked_add(length).and_then(|end| data.get(offset..end)).ok_or_else(|| {
+        let (offset, length) = (offset as u64, length as u64);
+        let outside = || {
             let problem = format!("bytes {offset}+{length} of buffer {buffer} with {}", data.len());
             source.invalid(element, problem)
-        })
+        };
+        let end =
+            offset.checked_add(length).filter(|&end| end <= data.len()).ok_or_else(outside)?;
+        let start = data.range.start;
+        let bytes = data.content.range(start + offset..start + end);
+        bytes.map_err(|e| source.io(e))?.ok_or_else(outside)
     }
 }
 
@@ -148,6 +172,7 @@ impl Packed {
         if size > most {
             return Err(bad(format!("{} bytes cannot hold {size}; at most {most}", data.len())));
         }
+        source.charge(element, size as u64)?;
         let mut out = self.unpack(data).ok_or_else(|| {
             bad(format!("{} bytes do not decode in mode {}", data.len(), self.mode))
         })?;

@@ -121,7 +121,7 @@ fn decode_image(
             if !uri.starts_with("data:") {
                 element = format!("image {index} ({uri})");
             }
-            source.uri(&element, uri)?
+            source.uri(&element, uri)?.whole().map_err(|e| source.io(e))?
         }
         (None, Some(view)) => buffers.view(source, root, view.value())?.bytes.into_owned(),
         (None, None) => return Err(source.invalid(element, "neither uri nor bufferView")),

@@ -12,8 +12,9 @@ mod primitive;
 mod tests;
 
 use crate::ImportError;
+use crate::files::Content;
 use crate::source::Source;
-use buffers::Buffers;
+use buffers::{Buffers, Part};
 use forest_soup::{Material, Model};
 use gltf::json::Root;
 
@@ -45,8 +46,9 @@ const SUPPORTED: &[&str] = &[
 
 /// Reads a `.glb` or `.gltf`.
 pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
-    let bytes = std::mem::take(&mut source.bytes);
-    let (json, blob) = split(source, &bytes)?;
+    let content = source.content();
+    let (json, blob) = split(source, content)?;
+    let json = &*json;
     let root: Root =
         gltf::json::deserialize::from_slice(json).map_err(|e| source.invalid("JSON", e))?;
     if let Some(extension) =
@@ -103,29 +105,55 @@ pub(crate) fn load(source: &mut Source) -> Result<Model, ImportError> {
     Ok(model)
 }
 
-/// The JSON and, of a binary container, the blob.
-fn split<'a>(source: &Source, bytes: &'a [u8]) -> Result<(&'a [u8], Option<Vec<u8>>), ImportError> {
-    if !bytes.starts_with(b"glTF") {
-        return Ok((bytes, None));
-    }
-    let word = |at: usize| {
-        bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
+/// The JSON and, of a binary container, where its binary chunk lies.
+fn split(source: &Source, content: Content) -> Result<(Vec<u8>, Option<Part>), ImportError> {
+    let io = |e| source.io(e);
+    let range = |from: u64, to: u64| content.range(from..to).map_err(io);
+    let word = |at: u64| {
+        let bytes = range(at, at + 4)?;
+        Ok::<_, ImportError>(
+            bytes.and_then(|b| <[u8; 4]>::try_from(&*b).ok()).map(u32::from_le_bytes),
+        )
     };
-    if word(4) == Some(1) {
-        return Err(source.unsupported("binary glTF version 1"));
+    let invalid = |problem: &str| Err(source.invalid("glb container", problem));
+    if word(0)? != Some(u32::from_le_bytes(*b"glTF")) {
+        return Ok((content.whole().map_err(io)?, None));
     }
-    if word(8).is_none_or(|length| length < 20) {
-        return Err(source.invalid("glb container", "its header says less than 20 bytes"));
+    match word(4)? {
+        Some(2) => {}
+        Some(other) => return Err(source.unsupported(format!("binary glTF version {other}"))),
+        None => return invalid("it ends within its header"),
     }
-    gltf::binary::Glb::from_slice(bytes).map_err(|e| source.invalid("glb container", e))?;
-    // The container is sound: the first chunk is the JSON.
-    let length = word(12).unwrap_or(0);
-    let json = &bytes[20..20 + length];
-    let blob = word(20 + length).map(|n| {
-        let start = 28 + length;
-        bytes[start..(start + n).min(bytes.len())].to_vec()
-    });
-    Ok((json, blob))
+    let length = match word(8)?.map(u64::from) {
+        Some(length) if length >= 20 && length <= content.len() => length,
+        Some(length) => {
+            let has = content.len();
+            return invalid(&format!(
+                "its header says {length} bytes; it has {has}, and 20 at least"
+            ));
+        }
+        None => return invalid("it ends within its header"),
+    };
+    let json_length = word(12)?.map_or(0, u64::from);
+    if word(16)? != Some(u32::from_le_bytes(*b"JSON")) {
+        return invalid("its first chunk is not the JSON");
+    }
+    let json_end = 20 + json_length;
+    if json_end > length {
+        return invalid(&format!("its JSON of {json_length} bytes goes beyond its end"));
+    }
+    let json = range(20, json_end)?.unwrap_or_default().into_owned();
+    let is_binary =
+        json_end + 8 <= length && word(json_end + 4)? == Some(u32::from_le_bytes(*b"BIN\0"));
+    if !is_binary {
+        return Ok((json, None));
+    }
+    let start = json_end + 8;
+    let end = start + word(json_end)?.map_or(0, u64::from);
+    if end > length {
+        return invalid(&format!("its binary chunk of {} bytes goes beyond its end", end - start));
+    }
+    Ok((json, Some(Part { content, range: start..end })))
 }
 
 /// An index that points at nothing.

@@ -79,7 +79,7 @@ pub(crate) fn instances(
 }
 
 struct Walk<'a> {
-    source: &'a Source,
+    source: &'a Source<'a>,
     root: &'a Root,
     buffers: &'a Buffers,
     of_mesh: &'a [Range<u32>],
@@ -175,11 +175,13 @@ impl Walk<'_> {
         let accessor =
             |name: &str| extension.attributes.get(name).map(|&i| Index::<Accessor>::new(i));
         let vectors = |name: &str| {
-            accessor(name).map(|a| reader.numbers(&element, a, &[Type::Vec3], [0.0; 3])).transpose()
+            accessor(name)
+                .map(|a| reader.numbers(&element, a, &[Type::Vec3], [0.0; 3], |v| v))
+                .transpose()
         };
         let (translation, scale) = (vectors("TRANSLATION")?, vectors("SCALE")?);
         let rotation = accessor("ROTATION")
-            .map(|a| reader.numbers(&element, a, &[Type::Vec4], [0.0; 4]))
+            .map(|a| reader.numbers(&element, a, &[Type::Vec4], [0.0; 4], |v| v))
             .transpose()?;
         let counts: Vec<usize> = [
             translation.as_ref().map(Vec::len),

@@ -39,8 +39,8 @@ pub(crate) fn mesh(
         return Ok(None);
     }
     let mut mesh = Mesh { name: element.into(), ..Mesh::default() };
-    let positions = reader.numbers(element, position, &[Type::Vec3], [0.0; 3])?;
-    mesh.positions = positions.iter().map(|p| DVec3::from_array(*p).as_vec3()).collect();
+    let single = |p| DVec3::from_array(p).as_vec3();
+    mesh.positions = reader.numbers(element, position, &[Type::Vec3], [0.0; 3], single)?;
     let count = mesh.positions.len();
     let same_length = |name: &str, n: usize| {
         if n == count {
@@ -50,24 +50,23 @@ pub(crate) fn mesh(
         }
     };
     if let Some(accessor) = attribute(Semantic::Normals) {
-        let normals = reader.numbers(element, accessor, &[Type::Vec3], [0.0; 3])?;
-        same_length("NORMAL", normals.len())?;
-        mesh.normals = normals.iter().map(|n| unit(*n)).collect();
+        mesh.normals = reader.numbers(element, accessor, &[Type::Vec3], [0.0; 3], unit)?;
+        same_length("NORMAL", mesh.normals.len())?;
     }
     if let Some(Some(look)) = look {
         let Some(accessor) = attribute(Semantic::TexCoords(look.uv_set)) else {
             let problem = format!("its material's texture needs TEXCOORD_{}", look.uv_set);
             return Err(source.invalid(element, problem));
         };
-        let uvs = reader.numbers(element, accessor, &[Type::Vec2], [0.0; 2])?;
-        same_length("TEXCOORD", uvs.len())?;
-        mesh.uvs = uvs.iter().map(|uv| look.apply(*uv)).collect();
+        let laid = |uv| look.apply(uv);
+        mesh.uvs = reader.numbers(element, accessor, &[Type::Vec2], [0.0; 2], laid)?;
+        same_length("TEXCOORD", mesh.uvs.len())?;
     }
     if let Some(accessor) = attribute(Semantic::Colors(0)) {
         let kinds = [Type::Vec3, Type::Vec4];
-        let colors = reader.numbers(element, accessor, &kinds, [1.0; 4])?;
-        same_length("COLOR_0", colors.len())?;
-        mesh.colors = colors.iter().map(|c| c.map(unit_range)).collect();
+        let tint = |c: [f64; 4]| c.map(unit_range);
+        mesh.colors = reader.numbers(element, accessor, &kinds, [1.0; 4], tint)?;
+        same_length("COLOR_0", mesh.colors.len())?;
     }
     mesh.triangles = triangles(&reader, element, primitive.indices, *mode, count)?;
     Ok(Some(mesh))

@@ -25,12 +25,21 @@ fn texture(n: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Texture {
     Texture { name: "t".into(), width: n, height: n, texels, wrap: [Wrap::Clamp; 2] }
 }
 
+fn shader<'a>(
+    soup: &'a TriangleSoup,
+    frame: BlockFrame,
+    options: &BakeOptions,
+) -> SurfelShader<'a> {
+    let alpha = soup.colors.iter().any(|c| c[3] != 1.0);
+    SurfelShader::new(&soup.materials, &soup.textures, alpha, frame, options)
+}
+
 fn surfels_of(soup: &TriangleSoup, surfel_size: SurfelSize) -> (Vec<Surfel>, Outcome) {
-    let frame = BlockFrame::of(soup).unwrap();
+    let frame = BlockFrame::of(soup.bounds()).unwrap();
     let options = BakeOptions { surfel_size, ..BakeOptions::default() };
-    let shader = SurfelShader::new(soup, frame, &options);
+    let shader = shader(soup, frame, &options);
     let mut out = Vec::new();
-    let outcome = SurfelMaker::new(&shader).push(0, &mut out);
+    let outcome = SurfelMaker::new(&shader).push(soup, 0, &mut out);
     (out, outcome)
 }
 
@@ -89,14 +98,14 @@ fn pieces_do_not_depend_on_what_the_cache_holds() {
     soup.uvs.extend_from_within(..);
     soup.triangles.push([3, 4, 5]);
     soup.triangle_materials.push(0);
-    let frame = BlockFrame::of(&soup).unwrap();
+    let frame = BlockFrame::of(soup.bounds()).unwrap();
     let options = BakeOptions { surfel_size: SurfelSize::Units(0.05), ..BakeOptions::default() };
-    let shader = SurfelShader::new(&soup, frame, &options);
+    let shader = shader(&soup, frame, &options);
     let made = |order: [usize; 2]| {
         let mut maker = SurfelMaker::new(&shader);
         let mut by_triangle = [Vec::new(), Vec::new()];
         for i in order {
-            maker.push(i, &mut by_triangle[i]);
+            maker.push(&soup, i, &mut by_triangle[i]);
         }
         format!("{by_triangle:?}")
     };
