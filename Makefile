@@ -20,13 +20,15 @@
 #   make samples  grow sample-data anew
 #   make fuzz     fuzz all that reads files, for T seconds (default 60) or RUNS executions a target; adds to
 #                 tests/fuzz/executions.tsv
+#   make reliability  kills, damaged files, writers at once, the largest tree, and the record of fuzzing; writes
+#                 docs/reliability.md (needs 12 GB of disk)
 #   make deny     licences, sources and bans by cargo-deny, if it is installed
 
 CARGO ?= cargo
 OUT := out
 T ?= 60
 
-.PHONY: snakemake foliage light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
+.PHONY: reliability snakemake foliage light gpu screen view landscape demo test check bench report views volume codebooks three picture golden samples fuzz deny setup
 
 # Installs what variable `missing` of a recipe's shell names, or says what to install.
 INSTALL = if [ -n "$$missing" ]; then \
@@ -171,6 +173,15 @@ codebooks: setup
 	$(CARGO) build --release --workspace --bins
 	target/release/codebooks > docs/CODEBOOKS.md.new && mv docs/CODEBOOKS.md.new docs/CODEBOOKS.md
 	@cat docs/CODEBOOKS.md
+
+# Tests at length: kills, damaged files, writers at once; and the largest tree.
+FIGURES := $(CURDIR)/target/figures
+reliability: setup
+	$(CARGO) build --release --workspace --bins
+	FOREST_FIGURES=$(FIGURES) FOREST_EFFORT=8 $(CARGO) test -p forest-tests --test all -- batch damaged
+	FOREST_FIGURES=$(FIGURES) target/release/bench large
+	target/release/reliability $(FIGURES) > docs/reliability.md.new && mv docs/reliability.md.new docs/reliability.md
+	@cat docs/reliability.md
 
 # Node.js, npm and Chromium, and three.js by npm: not needed by anything else.
 three: setup

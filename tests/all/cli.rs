@@ -1,4 +1,4 @@
-use crate::support::{arg, inspect, repo, run, succeed};
+use crate::support::{arg, forest_bake, inspect, repo, run, succeed};
 use std::fs;
 
 #[test]
@@ -182,4 +182,38 @@ fn levels_show_what_each_rule_keeps() {
     }
     let paper = table("paper radius and order");
     assert!(paper.iter().any(|r| r["under_ancestor"].as_u64().unwrap() > 0));
+}
+
+/// A tree from standard input, a picture to standard output.
+#[test]
+fn trees_and_pictures_go_through_pipes() {
+    let dir = tempfile::tempdir().unwrap();
+    let [piped, filed, picture] = ["a.fpack", "b.fpack", "b.png"].map(|n| arg(&dir.path().join(n)));
+    for tree in ["conifer.glb", "shrub.obj"] {
+        let file = repo("sample-data").join(tree);
+        let bytes = fs::read(&file).unwrap();
+        let bake = |from: &str, to: &str| {
+            forest_bake()
+                .args(["points", from, "-o", to, "--force", "-q", "--surfel-size", "0.2"])
+                .write_stdin(bytes.clone())
+                .output()
+                .unwrap()
+        };
+        let output = bake("-", &piped);
+        let error = String::from_utf8_lossy(&output.stderr);
+        if tree == "shrub.obj" {
+            // What is beside a file is not beside a pipe.
+            assert_eq!(output.status.code(), Some(3), "{error}");
+            assert!(error.contains("-: mtllib: cannot read shrub.mtl"), "{error}");
+            continue;
+        }
+        assert!(output.status.success(), "{error}");
+        assert!(bake(&arg(&file), &filed).status.success());
+        let draw = |pack: &str, to: &str| {
+            forest_bake().args(["draw", pack, "-o", to, "--size", "64", "-q"]).output().unwrap()
+        };
+        assert!(draw(&filed, &picture).status.success());
+        let drawn = draw(&piped, "-");
+        assert!(drawn.status.success() && drawn.stdout == fs::read(&picture).unwrap());
+    }
 }

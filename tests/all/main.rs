@@ -4,6 +4,7 @@ mod architecture; // the arrows between crates, licences, one version of what mu
 mod batch; // many assets: what is baked again, kills, caches, workflow engines
 mod blocks; // several trees baked together
 mod cli; // the program: usage, exit codes, what it prints, what it leaves behind
+mod damaged; // damaged files through the program
 mod eval; // packs against their sources: reports, calibration, chosen levels
 mod foliage; // foliage: wood and leaves, levels, wind
 mod foliage_export; // foliage as glb, branches as textures
@@ -19,5 +20,5 @@ mod real_trees; // trees by others, where they are present
 mod support; // temporary folders, running the program
 mod view; // forest-view: pictures, window, exit codes
 mod views; // views: what the program bakes, hard cases
-mod views_export; // what engines read // temporary folders, running the program
+mod views_export; // what engines read
 mod volume; // volumes: from meshes and photographs, order, hard cases

@@ -1,5 +1,6 @@
 //! What tests, the golden packs and the fuzz targets share.
 
+pub mod figures;
 pub mod fuzz;
 pub mod golden;
 pub mod landscapes;
@@ -31,9 +32,19 @@ use glam::DVec3;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// A fixed `meta` section.
-fn no_meta() -> Meta {
-    Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![], options: vec![] }
+/// The bytes of a pack with a fixed `meta` section and what `make` writes, and what that said.
+fn written<T, E: From<PackError>>(
+    make: impl FnOnce(&mut PackWriter) -> Result<T, E>,
+) -> Result<(Vec<u8>, T), E> {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let path = dir.path().join("t.fpack");
+    let mut writer = PackWriter::create(&path)?;
+    let meta =
+        Meta { generator: "test".into(), source_hash: [7; 32], sources: vec![], options: vec![] };
+    header::write(&mut writer, SectionId::new(kind::META, 0), &meta)?;
+    let made = make(&mut writer)?;
+    writer.finish()?;
+    Ok((std::fs::read(&path).expect("the pack that was just written"), made))
 }
 
 /// Bakes into memory; the pack has a fixed `meta` section.
@@ -44,13 +55,7 @@ pub fn bake_bytes(
     soup: &TriangleSoup,
     options: &BakeOptions,
 ) -> Result<(Vec<u8>, BakeReport), BakeError> {
-    let dir = tempfile::tempdir().expect("a temporary folder");
-    let path = dir.path().join("t.fpack");
-    let mut writer = PackWriter::create(&path)?;
-    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
-    let report = bake(soup, options, &mut writer, &|_| {})?;
-    writer.finish()?;
-    Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+    written(|writer| bake(soup, options, writer, &|_| {}))
 }
 
 /// [`bake_bytes`] of a model that is not flattened.
@@ -61,13 +66,7 @@ pub fn bake_model_bytes(
     model: Model,
     options: &BakeOptions,
 ) -> Result<(Vec<u8>, BakeReport), BakeError> {
-    let dir = tempfile::tempdir().expect("a temporary folder");
-    let path = dir.path().join("t.fpack");
-    let mut writer = PackWriter::create(&path)?;
-    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
-    let report = forest_points::bake_model(model, 1 << 24, options, &mut writer, &|_| {})?;
-    writer.finish()?;
-    Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+    written(|writer| forest_points::bake_model(model, 1 << 24, options, writer, &|_| {}))
 }
 
 /// Bakes views into memory; the pack has a fixed `meta` section.
@@ -75,10 +74,6 @@ pub fn bake_model_bytes(
 /// # Errors
 /// As [`forest_views::bake()`].
 pub fn bake_views(soup: &TriangleSoup, options: &ViewsOptions) -> Result<Vec<u8>, ViewsError> {
-    let dir = tempfile::tempdir().expect("a temporary folder");
-    let path = dir.path().join("t.fpack");
-    let mut writer = PackWriter::create(&path)?;
-    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
     let frame =
         Frame::of(soup, &options.directions, options.fit).ok_or(ViewsError::NothingToSee)?;
     let surfaces = Surfaces::new(&soup.materials, &soup.textures);
@@ -86,9 +81,7 @@ pub fn bake_views(soup: &TriangleSoup, options: &ViewsOptions) -> Result<Vec<u8>
     if options.channels.sky {
         scene = scene.with_skylight();
     }
-    forest_views::bake(&scene, &frame, options, &mut writer, &|_| {})?;
-    writer.finish()?;
-    Ok(std::fs::read(&path).expect("the pack that was just written"))
+    Ok(written(|writer| forest_views::bake(&scene, &frame, options, writer, &|_| {}))?.0)
 }
 
 /// The bytes of a pack of nothing but the volume of a soup, and what its bake said.
@@ -114,13 +107,7 @@ pub fn write_volume(
     volume: &Volume,
     codebook: Option<&CodebookOptions>,
 ) -> Result<(Vec<u8>, forest_volume::BakeReport), VolumeError> {
-    let dir = tempfile::tempdir().expect("a temporary folder");
-    let path = dir.path().join("t.fpack");
-    let mut writer = PackWriter::create(&path)?;
-    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
-    let report = forest_volume::bake(volume, codebook, &mut writer)?;
-    writer.finish()?;
-    Ok((std::fs::read(&path).expect("the pack"), report))
+    written(|writer| forest_volume::bake(volume, codebook, writer))
 }
 
 /// Bakes foliage into memory; the pack has a fixed `meta` section.
@@ -131,13 +118,7 @@ pub fn bake_foliage(
     soup: &TriangleSoup,
     options: &FoliageOptions,
 ) -> Result<(Vec<u8>, forest_foliage::BakeReport), FoliageError> {
-    let dir = tempfile::tempdir().expect("a temporary folder");
-    let path = dir.path().join("t.fpack");
-    let mut writer = PackWriter::create(&path)?;
-    header::write(&mut writer, SectionId::new(kind::META, 0), &no_meta())?;
-    let report = forest_foliage::bake(soup, options, &mut writer, &|_| {})?;
-    writer.finish()?;
-    Ok((std::fs::read(&path).expect("the pack that was just written"), report))
+    written(|writer| forest_foliage::bake(soup, options, writer, &|_| {}))
 }
 
 /// One pack of the sections of several; of two alike the first's. Points hang on foliage, if both are there.

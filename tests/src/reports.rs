@@ -25,11 +25,19 @@ pub fn load_soup(tree: &Path) -> Result<TriangleSoup> {
 /// # Errors
 /// When it fails, with what it said.
 pub fn program(args: &[&str]) -> Result<Vec<u8>> {
-    let forest_bake = std::env::current_exe()?.with_file_name("forest-bake");
-    let output = Command::new(forest_bake).args(args).output()?;
+    program_named("forest-bake", args)
+}
+
+/// Standard output of a program beside this one.
+///
+/// # Errors
+/// When it fails, with what it said.
+pub fn program_named(name: &str, args: &[&str]) -> Result<Vec<u8>> {
+    let program = std::env::current_exe()?.with_file_name(name);
+    let output = Command::new(program).args(args).output()?;
     if !output.status.success() {
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        bail!("forest-bake {args:?}: {}: {error}", output.status);
+        bail!("{name} {args:?}: {}: {error}", output.status);
     }
     Ok(output.stdout)
 }

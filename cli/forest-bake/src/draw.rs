@@ -19,14 +19,14 @@ use forest_volume::{Blending, Detail, VolumeBlock};
 use glam::DVec3;
 use image::{DynamicImage, ImageFormat, RgbImage, RgbaImage};
 use std::io::Cursor;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Pack to draw.
     #[arg(value_name = "PACK")]
     pack: PathBuf,
-    /// PNG to write.
+    /// PNG to write; - is standard output.
     #[arg(short, long, value_name = "PNG")]
     output: PathBuf,
     /// Side of the picture in pixels.
@@ -142,7 +142,8 @@ fn positive(text: &str) -> Result<f32, String> {
 }
 
 pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
-    if args.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+    let is_png = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    if !is_png && !is_stdout(&args.output) {
         return Err(
             Usage(format!("{}: pictures are written as .png", args.output.display())).into()
         );
@@ -426,5 +427,12 @@ fn write(args: &Args, pictures: &[Picture]) -> Result<()> {
     };
     let mut png = Cursor::new(Vec::new());
     sheet.write_to(&mut png, ImageFormat::Png)?;
+    if is_stdout(&args.output) {
+        return Ok(output::print_bytes(png.get_ref())?);
+    }
     output::write_file(&args.output, png.get_ref())
+}
+
+fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
 }

@@ -98,7 +98,7 @@ impl Directions {
             Layout::Rings { rings, points } => {
                 let small = (rings < 1).then_some(("rings", rings, 1));
                 let small = small.or((points < 3).then_some(("points a ring", points, 3)));
-                let all = u64::from(rings) * 2 * u64::from(points) + 2;
+                let all = (2 * u64::from(rings)).saturating_mul(points.into()).saturating_add(2);
                 ("rings", small, all / if self.dome == Dome::Upper { 2 } else { 1 })
             }
             Layout::Octahedral { side } => {
@@ -344,6 +344,11 @@ mod tests {
             "18446744065119617025 views in layout octahedral; the limit is 16384"
         );
         assert_eq!(bad(Layout::Rings { rings: 2, points: 2 }), "2 points a ring; at least 3");
+        // Found by fuzzing: 2^64 views are not none.
+        let wraps = bad(Layout::Rings { rings: 1 << 31, points: 1 << 31 });
+        assert_eq!(wraps, "9223372036854775810 views in layout rings; the limit is 16384");
+        let most = bad(Layout::Rings { rings: u32::MAX, points: u32::MAX });
+        assert_eq!(most, "18446744073709551615 views in layout rings; the limit is 16384");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::{Farm, POINTS, assert_valid, names, shipped};
 use crate::support::{arg, forest_bake};
+use forest_tests::figures;
 use serde_json::Value;
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -12,13 +13,18 @@ fn two_runs_at_once_share_a_cache() {
     let farms = [Farm::new(&names(20), POINTS), Farm::new(&names(20), POINTS)];
     let program = forest_bake().get_program().to_owned();
     // Twice on the same manifest, too.
-    let runs = [&farms[0], &farms[0], &farms[1]].map(|farm| {
-        Command::new(&program)
-            .args(["batch", &arg(&farm.manifest()), "--cache", &arg(cache.path())])
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
-    });
+    let writers = 3 * figures::effort();
+    let runs: Vec<_> = (0..writers)
+        .map(|i| &farms[usize::from(i % 3 == 2)])
+        .map(|farm| {
+            Command::new(&program)
+                .args(["batch", &arg(&farm.manifest()), "--cache", &arg(cache.path())])
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap()
+        })
+        .collect();
+    figures::note("writers", writers as f64);
     for run in runs {
         let output = run.wait_with_output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

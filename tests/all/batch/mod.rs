@@ -37,6 +37,13 @@ impl Farm {
         farm
     }
 
+    /// Removes all that was made.
+    fn forget(&self) {
+        for folder in ["packs", "exports", ".forest-bake", "cache"] {
+            let _ = std::fs::remove_dir_all(self.path(folder));
+        }
+    }
+
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }

@@ -2,6 +2,7 @@
 
 use super::{Farm, POINTS, assert_valid, files, names};
 use crate::support::{arg, inspect, repo, run, succeed};
+use forest_tests::figures;
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -47,6 +48,7 @@ fn two_hundred_assets_and_ten_broken_ones() {
     assert_eq!(code, 4);
     assert!(err.contains("0 baked, 190 up to date, 10 failed"), "{err}");
     assert!(seconds < 2.0, "{seconds} s");
+    figures::note("rebake-seconds", seconds);
     // A mended one is baked.
     std::fs::write(farm.path("trees/broken-3.obj"), super::tuft(7, super::LEAVES)).unwrap();
     let summary = farm.summary(4, &[]);

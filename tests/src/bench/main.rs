@@ -3,6 +3,7 @@
 //! own; runs of both programs alternate, because machines drift: compare ratios and medians.
 
 mod coverage;
+mod large;
 mod truth;
 
 use anyhow::{Context, Result, bail};
@@ -49,8 +50,9 @@ fn main() -> Result<()> {
             println!("{}", serde_json::to_string(&found)?);
             Ok(())
         }
-        [] => report(),
-        _ => bail!("usage: bench"),
+        [] => report().and_then(|()| large::report()),
+        ["large"] => large::report(),
+        _ => bail!("usage: bench [large]"),
     }
 }
 

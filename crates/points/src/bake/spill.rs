@@ -171,7 +171,8 @@ impl Spill {
                 for (cell, waiting) in waiting.iter_mut().enumerate() {
                     scratch.write(next[cell] * record.size() as u64, waiting)?;
                     next[cell] += (waiting.len() / record.size()) as u64;
-                    waiting.clear();
+                    // Pieces are near each other: other cells will have the next ones.
+                    *waiting = Vec::new();
                 }
                 bytes = 0;
             }
