@@ -178,7 +178,7 @@ codebooks: setup
 FIGURES := $(CURDIR)/target/figures
 reliability: setup
 	$(CARGO) build --release --workspace --bins
-	FOREST_FIGURES=$(FIGURES) FOREST_EFFORT=8 $(CARGO) test -p forest-tests --test all -- batch damaged
+	FOREST_FIGURES=$(FIGURES) FOREST_EFFORT=4 $(CARGO) test -p forest-tests --test all -- batch damaged
 	FOREST_FIGURES=$(FIGURES) target/release/bench large
 	target/release/reliability $(FIGURES) > docs/reliability.md.new && mv docs/reliability.md.new docs/reliability.md
 	@cat docs/reliability.md

@@ -5,10 +5,9 @@
 
 use crate::error::BatchError;
 use crate::event::Done;
+use crate::work::WorkFolder;
 use serde::{Deserialize, Serialize};
-use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 /// The cache.
 #[derive(Clone, Debug)]
@@ -25,19 +24,8 @@ struct Told {
 /// Name of the file in an entry that tells of it.
 const TOLD: &str = "done.json";
 
-/// A folder in which an entry is made: nobody takes it for left over while this is held.
-#[derive(Debug)]
-pub(crate) struct Making {
-    folder: TempDir,
-    /// Locked as long as it is open.
-    _lock: File,
-}
-
-impl Making {
-    pub(crate) fn path(&self) -> &Path {
-        self.folder.path()
-    }
-}
+/// How folders are named in which entries are made.
+const MAKING: &str = "entry-";
 
 impl Cache {
     /// The cache in a folder, which is made if need be. What runs left there that were killed is removed.
@@ -48,9 +36,7 @@ impl Cache {
         let new = Self { folder: folder.into() };
         let making = new.making();
         std::fs::create_dir_all(&making).map_err(BatchError::io(&making))?;
-        for entry in std::fs::read_dir(&making).map_err(BatchError::io(&making))?.flatten() {
-            remove_if_left(&entry.path());
-        }
+        WorkFolder::remove_left(&making, MAKING).map_err(BatchError::io(&making))?;
         Ok(new)
     }
 
@@ -63,19 +49,19 @@ impl Cache {
     }
 
     /// A folder to make an entry in.
-    pub(crate) fn make(&self) -> Result<Making, BatchError> {
+    pub(crate) fn make(&self) -> Result<WorkFolder, BatchError> {
         let making = self.making();
-        let folder = TempDir::new_in(&making).map_err(BatchError::io(&making))?;
-        let path = folder.path().join(LOCK);
-        let lock = File::create(&path).map_err(BatchError::io(&path))?;
-        lock.lock().map_err(BatchError::io(&path))?;
-        Ok(Making { folder, _lock: lock })
+        WorkFolder::new(&making, MAKING).map_err(BatchError::io(&making))
     }
 
     /// Gives what was made its name; paths of `done` lie in the folder.
-    pub(crate) fn publish(&self, key: &str, making: Making, done: &Done) -> Result<(), BatchError> {
-        let from = making.path().to_path_buf();
-        let from = &*from;
+    pub(crate) fn publish(
+        &self,
+        key: &str,
+        making: WorkFolder,
+        done: &Done,
+    ) -> Result<(), BatchError> {
+        let from = making.path();
         let inner = |p: &PathBuf| p.strip_prefix(from).unwrap_or(p).to_path_buf();
         let output = inner(&done.output);
         let exports = done.exports.iter().map(inner).collect();
@@ -83,17 +69,11 @@ impl Cache {
         let path = from.join(TOLD);
         let text = serde_json::to_vec_pretty(&told).expect("names and numbers");
         std::fs::write(&path, text).map_err(BatchError::io(&path))?;
-        let lock = from.join(LOCK);
-        std::fs::remove_file(&lock).map_err(BatchError::io(&lock))?;
         let to = self.entry(key);
         let shelf = to.parent().unwrap_or(&self.folder);
         std::fs::create_dir_all(shelf).map_err(BatchError::io(shelf))?;
-        match std::fs::rename(from, &to) {
-            Ok(()) => {
-                // It has moved.
-                let _ = making.folder.keep();
-                Ok(())
-            }
+        match making.rename(&to) {
+            Ok(()) => Ok(()),
             // Another writer was first.
             Err(_) if to.join(TOLD).is_file() => Ok(()),
             Err(e) => Err(BatchError::io(&to)(e)),
@@ -113,24 +93,11 @@ impl Cache {
     }
 }
 
-/// In a folder of work, open and locked as long as somebody works in it.
-pub const LOCK: &str = ".lock";
-
-/// Removes a folder of work that nobody holds any more.
-pub fn remove_if_left(folder: &Path) {
-    let Ok(lock) = File::open(folder.join(LOCK)) else { return };
-    match lock.try_lock() {
-        // What cannot be removed now is tried again the next time.
-        Ok(()) => _ = std::fs::remove_dir_all(folder),
-        Err(TryLockError::WouldBlock | TryLockError::Error(_)) => {}
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn made(cache: &Cache, bytes: &[u8]) -> (Making, Done) {
+    fn made(cache: &Cache, bytes: &[u8]) -> (WorkFolder, Done) {
         let making = cache.make().unwrap();
         let output = making.path().join("t.fpack");
         std::fs::write(&output, bytes).unwrap();
@@ -138,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_of_two_writers_wins_and_the_work_of_the_dead_is_removed() {
+    fn the_first_of_two_writers_wins() {
         let folder = tempfile::tempdir().unwrap();
         let cache = Cache::open(folder.path()).unwrap();
         let key = "abcdef";
@@ -151,11 +118,6 @@ mod tests {
         cache.publish(key, second, &second_done).unwrap();
         let done = cache.find(key).unwrap();
         assert_eq!((std::fs::read(&done.output).unwrap(), done.bytes), (b"one".to_vec(), 3));
-        let (dead, _) = made(&cache, b"half");
-        let left = dead.folder.keep();
-        drop(dead._lock);
-        Cache::open(folder.path()).unwrap();
-        assert!(!left.exists());
         let making = std::fs::read_dir(cache.making()).unwrap();
         assert_eq!(making.count(), 0, "nothing is left behind");
     }

@@ -37,8 +37,9 @@ mod run;
 mod settings;
 mod state;
 mod summary;
+mod work;
 
-pub use cache::{Cache, LOCK, remove_if_left};
+pub use cache::Cache;
 pub use compare::{Worse, worse};
 pub use error::BatchError;
 pub use event::{Done, Event, Line};
@@ -50,6 +51,7 @@ pub use run::{Outcome, Runner};
 pub use settings::{OptionValue, Options, Settings};
 pub use state::{Failure, Output, Record, State};
 pub use summary::{AssetSummary, Status, Summary};
+pub use work::WorkFolder;
 
 use std::path::Path;
 

@@ -1,10 +1,11 @@
 //! Running jobs: each bake is a process of its own, so that none can take others with it.
 
-use crate::cache::{Cache, Making};
+use crate::cache::Cache;
 use crate::error::BatchError;
 use crate::event::{Done, Event, Line};
 use crate::job::{Job, Reason};
 use crate::state::{Failure, Held, Output, Record, State};
+use crate::work::WorkFolder;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -50,7 +51,7 @@ struct Running {
     _stdin: Option<ChildStdin>,
     memory: u64,
     _held: Held,
-    making: Option<Making>,
+    making: Option<WorkFolder>,
     /// What it said last.
     done: Option<Done>,
     failure: Option<Failure>,

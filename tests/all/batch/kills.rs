@@ -26,13 +26,19 @@ fn left(farm: &Farm) -> Vec<String> {
     out
 }
 
-/// Makes hidden files a minute older: new ones might be those of others, and are left alone.
-fn age_hidden(folder: &Path) {
+/// Makes all that was left a minute older: what is new might be that of others, and is left alone.
+fn age_left(folder: &Path) {
     let past = SystemTime::now() - Duration::from_secs(60);
+    let age = |path: &Path| File::open(path).unwrap().set_modified(past).unwrap();
     files(folder, &mut |path| {
         if path.file_name().unwrap().to_string_lossy().starts_with(".fpack-") {
-            File::options().write(true).open(path).unwrap().set_modified(past).unwrap();
+            age(path);
         }
+        let is_work = |p: &&Path| {
+            let name = p.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with(".forest-bake-work-") || name.starts_with("entry-")
+        };
+        path.ancestors().filter(is_work).for_each(age);
     });
 }
 
@@ -90,7 +96,7 @@ fn killed_at_random_points_it_loses_nothing_and_ends_with_the_same_bytes() {
         assert!(current > 0, "it went on where it stopped");
         // Bakes of the dead end with them, and what they left is removed by the next that works there.
         std::thread::sleep(Duration::from_millis(300));
-        age_hidden(farm.folder.path());
+        age_left(farm.folder.path());
         farm.summary(0, &[options, &["--force"]].concat());
         assert_eq!(farm.made(), want);
         assert_eq!(left(&farm), Vec::<String>::new());
@@ -142,7 +148,7 @@ fn what_killed_commands_left_is_removed() {
         child.kill().unwrap();
         child.wait().unwrap();
         seen = seen.max(hidden(dir.path()));
-        age_hidden(dir.path());
+        age_left(dir.path());
         if seen > 0 && wait > 10 {
             break;
         }

@@ -1,11 +1,9 @@
 //! The folder in which a bake works: beside its target, so that what is finished takes its name by a rename.
 
 use anyhow::{Context, Result};
-use forest_batch::{LOCK, remove_if_left};
-use std::fs::File;
+use forest_batch::WorkFolder;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 /// How such folders are named.
 const PREFIX: &str = ".forest-bake-work-";
@@ -15,9 +13,7 @@ pub(super) const PACK: &str = "pack.fpack";
 
 /// The folder; it goes away with this.
 pub(super) struct Work {
-    folder: TempDir,
-    /// Locked as long as it is open: others know by it that somebody works here.
-    _lock: File,
+    folder: WorkFolder,
 }
 
 impl Work {
@@ -25,18 +21,10 @@ impl Work {
     pub(super) fn beside(output: &Path) -> Result<Self> {
         let beside = folder_of(output);
         let told = || beside.display().to_string();
-        for entry in std::fs::read_dir(beside).with_context(told)?.flatten() {
-            if entry.file_name().to_string_lossy().starts_with(PREFIX) {
-                remove_if_left(&entry.path());
-            }
-        }
-        let folder =
-            tempfile::Builder::new().prefix(PREFIX).tempdir_in(beside).with_context(told)?;
-        let lock = File::create(folder.path().join(LOCK)).with_context(told)?;
-        lock.lock().with_context(told)?;
+        let folder = WorkFolder::new(beside, PREFIX).with_context(told)?;
         std::fs::create_dir(folder.path().join("exports")).with_context(told)?;
         std::fs::create_dir(folder.path().join("pruned")).with_context(told)?;
-        Ok(Self { folder, _lock: lock })
+        Ok(Self { folder })
     }
 
     pub(super) fn pack(&self) -> PathBuf {
