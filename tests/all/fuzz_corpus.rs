@@ -24,7 +24,7 @@ fn the_corpus_ends_in_values_or_errors() {
 /// replaced by extremes, hashes made good.
 #[test]
 fn extreme_words_in_any_section_never_panic() {
-    // The points, many and alike, are sampled.
+    // Sections are sampled: fuzzing sees the rest of them.
     for golden in golden::all() {
         extreme_words(&std::fs::read(golden.path()).unwrap());
     }
@@ -36,7 +36,7 @@ fn extreme_words(golden: &[u8]) {
         pack.sections().map(|(id, _)| pack.bytes(id, 1 << 20).unwrap().into_owned()).collect();
     let mut refused = 0;
     for (which, original) in sections.iter().enumerate() {
-        let step = 4 * original.len().div_ceil(4 * 150).max(1);
+        let step = 4 * original.len().div_ceil(4 * 60).max(1);
         for at in (0..original.len().saturating_sub(3)).step_by(step) {
             for word in [0u32, 1, 0x7fff_ffff, 0x8000_0000, 0xffff_ffff, 0x7f80_0000] {
                 let mut data = original.clone();

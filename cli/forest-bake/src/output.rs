@@ -12,7 +12,7 @@ pub(crate) fn print(text: &str) -> std::io::Result<()> {
     print_bytes(text.as_bytes())
 }
 
-/// As [`print`], of what is no text.
+/// As [`print()`], of what is no text.
 pub(crate) fn print_bytes(bytes: &[u8]) -> std::io::Result<()> {
     match std::io::stdout().write_all(bytes) {
         Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
