@@ -2,7 +2,7 @@
 
 use super::{Device, assert_same, cameras, self_shadowed, thresholds, tree};
 use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
-use forest_foliage::Wind;
+use forest_foliage::{CrownLight, Wind};
 use forest_gpu::{
     Frame, Gpu, Layer, Look, Model, Options, Renderer, What, adapters, instance, read_picture,
     read_samples,
@@ -24,10 +24,13 @@ fn points_are_the_same(name: &str, pack: &Pack, cuts: &[Thresholds]) {
     let mut model = Model::load(&device.gpu, &device.renderer, pack).unwrap();
     let block = PointsBlock::open(pack).unwrap();
     let surfaces = read_surfaces(pack, &block).unwrap();
+    let crown = CrownLight::read(pack).unwrap();
     for (c, camera) in cameras(model.bounds()).iter().enumerate() {
+        let to_eye = camera.to_eye(block.middle());
         for (t, thresholds) in cuts.iter().enumerate() {
             for (l, light) in [Light::Albedo, self_shadowed()].into_iter().enumerate() {
-                let style = Style { sampling: Sampling::MIDDLE, light };
+                let lit = crown.map_or(light, |crown| crown.light(light, to_eye));
+                let style = Style { sampling: Sampling::MIDDLE, light: lit };
                 let (cpu, cost) =
                     draw_points(&block, surfaces.as_ref(), camera, thresholds, &style);
                 let layers = [Layer::whole(What::Points(*thresholds))];
