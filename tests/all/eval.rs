@@ -222,7 +222,7 @@ fn chosen_levels_keep_their_promise() {
         {
             let Some(choice) = choice else { continue };
             let t = Thresholds::of_level(choice.level);
-            let (picture, drawn) = draw_points(&block, Some(&surfaces), &camera, &t, &style);
+            let (picture, drawn) = draw_points(&block, Some(&surfaces), &camera, &t, style);
             let error = Comparison::new(&source, &picture).errors(BACKGROUND, 1.0).rmse;
             assert!(choice.error <= within);
             if t == Thresholds::TRIANGLES {

@@ -213,7 +213,7 @@ fn the_page_for_readers_is_true() {
             depth_bias: PixelArea(0.0),
         };
         let style = Style { sampling: Sampling::MIDDLE, light: Light::Albedo };
-        let (want, drawn) = draw_points(&block, None, &camera, &thresholds, &style);
+        let (want, drawn) = draw_points(&block, None, &camera, &thresholds, style);
         assert!(drawn.points > 20, "{code}: {drawn:?}");
         let got = picture(&arg(&png));
         let differ = got.pixels().zip(&want.pixels).filter(|(g, w)| (g[3] > 0) != (w[3] > 0.0));

@@ -31,7 +31,7 @@ fn camera(block: &ViewsBlock, from: DVec3, side: u32) -> Camera {
 fn drawn(pack: &Pack, from: DVec3, side: u32, lookup: Lookup) -> Picture {
     let block = ViewsBlock::open(pack).unwrap();
     let camera = camera(&block, from.normalize(), side);
-    ViewsLevel::read(&block, 0).unwrap().draw(&camera, lookup, &Style::default()).0
+    ViewsLevel::read(&block, 0).unwrap().draw(&camera, lookup, Style::default()).0
 }
 
 fn truth(soup: &TriangleSoup, pack: &Pack, from: DVec3, side: u32) -> Picture {
@@ -273,7 +273,7 @@ fn a_perspective_camera_sees_what_a_parallel_one_does_from_afar() {
     let far = Camera::new(eye, -from, Projection::Perspective { fov_y }, [64; 2]);
     let level = ViewsLevel::read(&block, 0).unwrap();
     for lookup in Lookup::ALL {
-        let [a, b] = [&parallel, &far].map(|c| level.draw(c, lookup, &Style::default()).0);
+        let [a, b] = [&parallel, &far].map(|c| level.draw(c, lookup, Style::default()).0);
         assert!(rmse(&a, &b) < 0.01, "{lookup:?}: {}", rmse(&a, &b));
         let (da, db) = (a.depth[64 * 32 + 32], b.depth[64 * 32 + 32]);
         let apart = f64::from(db) - distance - (f64::from(da) - 3.0 * block.header.radius);
@@ -445,7 +445,7 @@ fn the_coarsest_levels_keep_their_coverage_when_drawn() {
     let camera = Camera::new(eye, -from, projection, [64; 2]);
     let covered = |level: usize| {
         let level = ViewsLevel::read(&block, level).unwrap();
-        level.draw(&camera, Lookup::Nearest, &Style::default()).0.mean_coverage()
+        level.draw(&camera, Lookup::Nearest, Style::default()).0.mean_coverage()
     };
     for level in 1..5 {
         let ratio = covered(level) / covered(0);
@@ -466,7 +466,7 @@ fn depth_from_a_baked_direction_has_no_holes() {
         let from = block.directions().direction(view);
         let eye = block.center() + from * (3.0 * block.header.radius);
         let camera = Camera::new(eye, -from, Projection::Perspective { fov_y: 0.8 }, [96; 2]);
-        let got = views.draw(&camera, Lookup::Depth, &Style::default()).0.mean_coverage();
+        let got = views.draw(&camera, Lookup::Depth, Style::default()).0.mean_coverage();
         let want = rasterize(&soup, &surfaces, &camera, &Style::default()).mean_coverage();
         assert!((got / want - 1.0).abs() < 0.03, "view {view}: {got} of {want}");
     }
@@ -539,8 +539,8 @@ fn one_sample_a_pixel_is_the_same_whatever_else_is_asked() {
     let level = ViewsLevel::read(&block, 0).unwrap();
     let camera = camera(&block, DVec3::new(0.2, 0.4, 0.9).normalize(), 48);
     let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
-    let once = level.draw(&camera, Lookup::Depth, &style).0;
+    let once = level.draw(&camera, Lookup::Depth, style).0;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(pool.install(|| level.draw(&camera, Lookup::Depth, &style).0) == once);
+    assert!(pool.install(|| level.draw(&camera, Lookup::Depth, style).0) == once);
     assert!(once.pixels.iter().all(|p| p[3] == 0.0 || p[3] == 1.0));
 }

@@ -44,7 +44,7 @@ fn parallel(block: &VolumeBlock, from: DVec3, side: u32) -> Camera {
 }
 
 fn drawn(block: &VolumeBlock, camera: &Camera, detail: Detail, blending: Blending) -> Picture {
-    VolumeScene::read(block).unwrap().draw(camera, detail, blending, &Sampling::TRUTH.into()).0
+    VolumeScene::read(block).unwrap().draw(camera, detail, blending, Style::from(Sampling::TRUTH)).0
 }
 
 fn truth(soup: &TriangleSoup, camera: &Camera) -> Picture {

@@ -198,8 +198,8 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         table.cheapest(&need, 0.1).or(table.best_within(&need, 1e3));
     }
     if let Some(crown) = CrownLight::read(&pack)? {
-        let lit = crown.light(forest_raster::Light::MORNING, DVec3::X);
-        assert!(matches!(lit, forest_raster::Light::Sun(sun) if sun.sun[0].is_finite()));
+        let seen = crown.shade(DVec3::Y).at(DVec3::ONE)[0] * crown.sunlit(DVec3::Y, DVec3::X);
+        assert!((0.0..=2.0).contains(&seen));
     }
     let mut drawn = if ViewsBlock::is_in(&pack) { use_views(&pack)? } else { 0 };
     drawn += if VolumeBlock::is_in(&pack) { use_volume(&pack)? } else { 0 };
@@ -226,9 +226,9 @@ pub fn use_pack(bytes: &[u8]) -> Result<usize, PackError> {
         drawn += cut.points(&block).count() + cut.triangle_count() as usize;
         let small = Camera { width: 16, height: 16, ..camera };
         let style = Style { sampling: Sampling::MIDDLE, ..Style::default() };
-        draw_points(&block, surfaces.as_ref(), &small, &thresholds, &style);
+        draw_points(&block, surfaces.as_ref(), &small, &thresholds, style);
         if let Some(bent) = &bent {
-            draw_bent_points(&block, surfaces.as_ref(), &small, &thresholds, &style, bent);
+            draw_bent_points(&block, surfaces.as_ref(), &small, &thresholds, style, bent);
         }
     }
     Ok(drawn)
@@ -249,7 +249,7 @@ fn use_views(pack: &Pack) -> Result<usize, PackError> {
             let eye = block.center() + from * (distance * block.header.radius);
             let camera = Camera::new(eye, -from, projection, [8, 8]);
             for lookup in Lookup::ALL {
-                drawn += views.draw(&camera, lookup, &style).1.views as usize;
+                drawn += views.draw(&camera, lookup, style).1.views as usize;
             }
         }
     }
@@ -271,7 +271,8 @@ fn use_volume(pack: &Pack) -> Result<usize, PackError> {
         let camera = Camera::new(middle + from * (distance * side), -from, projection, [8, 8]);
         for detail in [Detail::Level(2), Detail::PIXEL] {
             for blending in [Blending::Shares, Blending::Over] {
-                let (_, cost) = scene.draw(&camera, detail, blending, &Sampling::MIDDLE.into());
+                let (_, cost) =
+                    scene.draw(&camera, detail, blending, Style::from(Sampling::MIDDLE));
                 drawn += cost.billboards as usize;
             }
         }

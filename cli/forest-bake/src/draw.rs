@@ -6,9 +6,9 @@ use crate::log::Log;
 use crate::output;
 use anyhow::{Context, Result, bail};
 use forest_draw::{
-    FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
+    CrownStyle, FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
 };
-use forest_foliage::{BentPoints, CrownLight, FoliageBlock, PointsWind, Pose, Wind};
+use forest_foliage::{BentPoints, FoliageBlock, PointsWind, Pose, Wind};
 use forest_pack::Pack;
 use forest_pack::measures::{ErrorKind, Measures};
 use forest_points::{PixelArea, PointsBlock, Thresholds, within_budget};
@@ -173,17 +173,6 @@ pub(crate) fn run(args: &Args, log: Log) -> Result<()> {
     write(args, &pictures)
 }
 
-/// The style under what the pack's crown shows of the light to an eye in this direction; `own_sky` if what
-/// is drawn knows what it sees of the sky.
-fn on_crown(pack: &Pack, style: &Style, to_eye: DVec3, own_sky: bool) -> Result<Style> {
-    let light = match CrownLight::read(pack)? {
-        Some(crown) if own_sky => crown.sunlight(style.light, to_eye),
-        Some(crown) => crown.light(style.light, to_eye),
-        None => style.light,
-    };
-    Ok(Style { light, ..*style })
-}
-
 impl Args {
     /// The foliage of a pack that its points bend with; `None` in a calm.
     fn points_in_wind<'p>(
@@ -209,7 +198,8 @@ fn draw_all_points(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<
     let surfaces = read_surfaces(pack, &block)?;
     let [min, max] = [block.header.min, block.header.max].map(|v| block.to_world(v.into()));
     let camera = args.camera([min, max])?;
-    let style = &on_crown(pack, style, camera.to_eye(0.5 * (min + max)), false)?;
+    let on_crown = CrownStyle::read(pack, style)?;
+    let lit = on_crown.seen_from(camera.to_eye(0.5 * (min + max)));
     let tied = args.points_in_wind(pack, &block)?;
     let pose = tied.as_ref().map(|(f, _)| Pose::new(f.branches, &args.wind, 0.0));
     let bent = tied.as_ref().zip(pose.as_ref()).map(|((f, w), pose)| BentPoints::new(f, w, pose));
@@ -217,8 +207,8 @@ fn draw_all_points(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<
     for thresholds in args.levels(pack, &block, &camera, log)? {
         let (surfaces, cut) = (surfaces.as_ref(), &thresholds);
         let (picture, drawn) = match &bent {
-            Some(bent) => draw_bent_points(&block, surfaces, &camera, cut, style, bent),
-            None => draw_points(&block, surfaces, &camera, cut, style),
+            Some(bent) => draw_bent_points(&block, surfaces, &camera, cut, lit, bent),
+            None => draw_points(&block, surfaces, &camera, cut, lit),
         };
         if block.is_beyond(&camera, &thresholds) {
             let (name, finest) = (pack.path().display(), thresholds.finest.0);
@@ -247,13 +237,13 @@ fn draw_all_views(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result<V
     let block = ViewsBlock::open(pack)?;
     let bounds = block.header.bounds.map(|b| block.center() + DVec3::from_array(b));
     let camera = args.camera(bounds)?;
-    let sky = block.header.channels.sky;
-    let style = &on_crown(pack, style, camera.to_eye(block.center()), sky)?;
+    let on_crown = CrownStyle::read(pack, style)?;
+    let lit = on_crown.seen_from(camera.to_eye(block.center()));
     let mut pictures = Vec::new();
     for lookup in args.lookup.iter().map(|&l| Lookup::from(l)) {
         let chosen = select(&block, &camera, lookup, args.texel);
         let level = ViewsLevel::read(&block, chosen.level)?;
-        let (picture, drawn) = level.draw(&camera, lookup, style);
+        let (picture, drawn) = level.draw(&camera, lookup, lit);
         if log.says() {
             eprintln!(
                 "{}: {} of {} views of {}² texels, {}, coverage {:.4}",
@@ -326,14 +316,15 @@ fn draw_all_volumes(args: &Args, pack: &Pack, style: &Style, log: Log) -> Result
         details.push(Detail::Planes { texel: args.texel, fade: Detail::FADE });
     }
     let [min, max] = block.header.bounds.map(DVec3::from_array);
-    let style = match CrownLight::read(pack)? {
-        Some(_) => &on_crown(pack, style, camera.to_eye(0.5 * (min + max)), false)?,
+    let on_crown = CrownStyle::read(pack, style)?;
+    let lit = match on_crown.is_on_crown() {
+        true => on_crown.seen_from(camera.to_eye(0.5 * (min + max))),
         // It may be made of photographs, which have their light in them.
-        None => &style.sampling.into(),
+        false => Style::from(style.sampling).into(),
     };
     let mut pictures = Vec::new();
     for detail in details {
-        let (picture, drawn) = scene.draw(&camera, detail, blending, style);
+        let (picture, drawn) = scene.draw(&camera, detail, blending, lit);
         if log.says() {
             eprintln!(
                 "{} cells, {} billboards, {}, coverage {:.4}",

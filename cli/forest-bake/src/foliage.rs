@@ -108,8 +108,8 @@ pub(crate) struct Summary {
     leaves: usize,
     /// Finest first.
     levels: Vec<LevelSummary>,
-    /// Shares of the sun that the other representations of the pack show, the sun behind the eye and
-    /// against it, 45° high; and of the sky.
+    /// Shares of the light that comes through the crown that the other representations of the pack show:
+    /// of a sun behind the eye and of one against it, 45° high; and of the sky.
     light: [f32; 3],
     /// Texels across and down the dictionary, and the share that pictures fill.
     dictionary: [u32; 2],
@@ -170,7 +170,7 @@ impl Summary {
         let to_sun = DVec3::new(0.0, 1.0, 1.0).normalize();
         let sunlit = |to_eye| report.light.sunlit(to_sun, to_eye);
         Ok(Self {
-            light: [sunlit(to_sun), sunlit(-to_sun), report.light.sky],
+            light: [sunlit(to_sun), sunlit(-to_sun), report.light.skylit(DVec3::Z)],
             output: args.output.clone(),
             bytes: std::fs::metadata(&args.output)?.len(),
             materials: report
@@ -254,8 +254,8 @@ impl Summary {
         }
         let [behind, against, sky] = self.light.map(|share| 100.0 * share);
         eprintln!(
-            "light: points, views and volumes of this pack show {behind:.0} % of a sun behind the eye, \
-             {against:.0} % of one against it, {sky:.0} % of the sky"
+            "light: of what comes through the crown, points, views and volumes of this pack show {behind:.0} % of \
+             a sun behind the eye, {against:.0} % of one against it, {sky:.0} % of the sky"
         );
         let [w, h] = self.dictionary;
         eprintln!(

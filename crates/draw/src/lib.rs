@@ -5,6 +5,8 @@
 //! with their textures and alpha rule, opacity by the hash rule, no sorting and no blending.
 //! [`ViewsLevel`] draws a level of views the same way, sample by sample; [`PointsSubject`] lets views
 //! be captured from points. [`FoliageScene`] draws the meshes of foliage, bent by the wind. [`VolumeScene`] sorts and blends: that is what its billboards are made for.
+//! All but foliage, which has a shadow map, take [`Lit`]: a style, on the crown of a pack or without one
+//! ([`CrownStyle`]).
 //!
 //! ```
 //! use forest_draw::draw_points;
@@ -36,12 +38,14 @@
 //! ```
 
 mod foliage;
+mod lit;
 mod points;
 mod subject;
 mod views;
 mod volume;
 
 pub use foliage::FoliageScene;
+pub use lit::{CrownStyle, Lit};
 pub use points::{
     Drawn, PointsFrame, draw_bent_points, draw_points, point_ellipses, read_surfaces,
 };

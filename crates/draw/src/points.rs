@@ -1,6 +1,7 @@
 //! The points representation: select, project, draw.
 
-use forest_foliage::BentPoints;
+use crate::lit::Lit;
+use forest_foliage::{BentPoints, Gain};
 use forest_pack::{Pack, PackError};
 use forest_points::record::decode_axis;
 use forest_points::spheroid::Footprint;
@@ -43,27 +44,27 @@ impl Drawn {
 
 /// Draws the cut for `camera` and `thresholds`. Without `surfaces` (a pack without triangles)
 /// points are drawn however large.
-pub fn draw_points(
+pub fn draw_points<'a>(
     block: &PointsBlock,
     surfaces: Option<&Surfaces>,
     camera: &Camera,
     thresholds: &Thresholds,
-    style: &Style,
+    lit: impl Into<Lit<'a>>,
 ) -> (Picture, Drawn) {
-    let frame = PointsFrame::new(block, surfaces, camera, thresholds, style, None);
+    let frame = PointsFrame::new(block, surfaces, camera, thresholds, lit, None);
     (frame.draw(), frame.drawn)
 }
 
 /// [`draw_points`], as the wind bends them.
-pub fn draw_bent_points(
+pub fn draw_bent_points<'a>(
     block: &PointsBlock,
     surfaces: Option<&Surfaces>,
     camera: &Camera,
     thresholds: &Thresholds,
-    style: &Style,
+    lit: impl Into<Lit<'a>>,
     bent: &BentPoints,
 ) -> (Picture, Drawn) {
-    let frame = PointsFrame::new(block, surfaces, camera, thresholds, style, Some(bent));
+    let frame = PointsFrame::new(block, surfaces, camera, thresholds, lit, Some(bent));
     (frame.draw(), frame.drawn)
 }
 
@@ -71,37 +72,38 @@ pub fn draw_bent_points(
 pub struct PointsFrame<'a> {
     list: DisplayList<'a>,
     camera: &'a Camera,
-    style: &'a Style,
+    style: Style,
     drawn: Drawn,
     bytes: u64,
 }
 
 impl<'a> PointsFrame<'a> {
     /// Selects and projects; the arguments are those of [`draw_points`] and [`draw_bent_points`].
-    pub fn new(
+    pub fn new<'l>(
         block: &PointsBlock,
         surfaces: Option<&'a Surfaces>,
         camera: &'a Camera,
         thresholds: &Thresholds,
-        style: &'a Style,
+        lit: impl Into<Lit<'l>>,
         bent: Option<&BentPoints>,
     ) -> Self {
+        let lit = lit.into();
         let mut thresholds = *thresholds;
         if surfaces.is_none() {
             thresholds.largest.0 = f64::INFINITY;
         }
         let cut = select(block, camera, &thresholds);
-        let ellipses = point_ellipses(block, &cut, camera, style, bent, &|_| true);
+        let ellipses = point_ellipses(block, &cut, camera, lit, bent, &|_| true);
         let mut list = DisplayList::of_ellipses(ellipses);
         if let Some(surfaces) = surfaces {
-            triangles(block, &cut, camera, surfaces, style, bent, &mut list);
+            triangles(block, &cut, camera, surfaces, &lit, bent, &mut list);
         }
         let points = cut.points(block).count() as u64;
         let drawn = Drawn { points, triangles: cut.triangle_count() };
         let looked_at: u64 = cut.cells.iter().map(|c| c.points.len() as u64).sum();
         let bytes = looked_at * size_of::<PointRecord>() as u64
             + drawn.triangles * size_of::<TriangleRecord>() as u64;
-        Self { list, camera, style, drawn, bytes }
+        Self { list, camera, style: lit.style, drawn, bytes }
     }
 
     /// What will be drawn.
@@ -121,20 +123,20 @@ impl<'a> PointsFrame<'a> {
 
     /// The picture.
     pub fn draw(&self) -> Picture {
-        draw(&self.list, self.camera, self.style)
+        draw(&self.list, self.camera, &self.style)
     }
 }
 
-/// The points of a cut whose index `keep` wants, as `camera` sees them, lit as `style` says, without
-/// those behind the eye.
-pub fn point_ellipses(
+/// The points of a cut whose index `keep` wants, as `camera` sees them, without those behind the eye.
+pub fn point_ellipses<'a>(
     block: &PointsBlock,
     cut: &Cut,
     camera: &Camera,
-    style: &Style,
+    lit: impl Into<Lit<'a>>,
     bent: Option<&BentPoints>,
     keep: &(dyn Fn(u32) -> bool + Sync),
 ) -> Vec<Ellipse> {
+    let lit = lit.into();
     let projector = Projector::new(camera, near(block));
     let ellipses = |c: &CellCut| -> Vec<Ellipse> {
         c.drawn_points(block)
@@ -147,7 +149,7 @@ pub fn point_ellipses(
                     let hung = bent.point(id);
                     (world, axis) = (bent.place(hung, world), bent.direction(hung, axis));
                 }
-                ellipse(block, &projector, camera, style, number, p, [world, axis])
+                ellipse(block, &projector, camera, &lit, number, p, [world, axis])
             })
             .collect()
     };
@@ -163,7 +165,7 @@ fn ellipse(
     block: &PointsBlock,
     projector: &Projector,
     camera: &Camera,
-    style: &Style,
+    lit: &Lit,
     id: u32,
     p: &PointRecord,
     [world, axis]: [DVec3; 2],
@@ -180,8 +182,8 @@ fn ellipse(
     let f = Footprint::new(center, radius, p.flatness_step(), axis, to_eye, plane);
     // The axis has no sign: it is the side that is seen.
     let normal = if axis.dot(to_eye) < 0.0 { -axis } else { axis }.as_vec3();
-    let sunlit = style.light.seen(world - block.middle(), block.half_diagonal());
-    let light = style.light.factors(normal, sunlit, 1.0);
+    let [sunlit, skylit] = lit.seen(world, block.middle(), block.half_diagonal(), Gain::POINTS);
+    let light = lit.style.light.factors(normal, sunlit, skylit);
     let color = p.color();
     Some(Ellipse {
         id,
@@ -201,7 +203,7 @@ fn triangles<'s>(
     cut: &Cut,
     camera: &Camera,
     surfaces: &'s Surfaces,
-    style: &Style,
+    lit: &Lit,
     bent: Option<&BentPoints>,
     list: &mut DisplayList<'s>,
 ) {
@@ -212,7 +214,7 @@ fn triangles<'s>(
         let first_id = block.triangle_offset(c.cell);
         for i in c.triangles.clone() {
             let t = &block.triangles[i as usize];
-            let corners = corners(block, cell, i, t, style, bent);
+            let corners = corners(block, cell, i, t, lit, bent);
             list.triangle(&projector, surfaces, t.material, first_id.wrapping_add(i), corners);
         }
     }
@@ -224,7 +226,7 @@ fn corners(
     cell: &CellRecord,
     index: u32,
     t: &TriangleRecord,
-    style: &Style,
+    lit: &Lit,
     bent: Option<&BentPoints>,
 ) -> [Corner; 3] {
     let range = block.header.uv_ranges[t.material as usize];
@@ -242,10 +244,12 @@ fn corners(
             let hung = bent.corners(index)[k];
             (position, normal) = (bent.place(hung, position), bent.direction(hung, normal));
         }
+        let (middle, half_diagonal) = (block.middle(), block.half_diagonal());
+        let [sunlit, skylit] = lit.seen(position, middle, half_diagonal, Gain::SOURCE);
         Corner {
             position,
-            sunlit: style.light.seen(position - block.middle(), block.half_diagonal()),
-            skylit: 1.0,
+            sunlit,
+            skylit,
             normal: normal.as_vec3(),
             uv: Vec2::from_array(range.decode(v.uv)),
             color,

@@ -32,7 +32,7 @@ impl Subject for PointsSubject<'_> {
         };
         let sampling = Sampling { side: samples.min(16), seed: 1 };
         let style = Style { sampling, light: Light::Albedo };
-        let (picture, _) = draw_points(self.block, None, camera, &thresholds, &style);
+        let (picture, _) = draw_points(self.block, None, camera, &thresholds, style);
         Capture { picture, sky: Vec::new() }
     }
 }

@@ -1,7 +1,9 @@
 //! The views representation: a square of samples, each a ray through one to three views.
 
+use crate::lit::Lit;
+use forest_foliage::Gain;
 use forest_pack::PackError;
-use forest_raster::{DisplayList, Light, Picture, Sprite, SpriteHit, Style, covers, draw};
+use forest_raster::{DisplayList, Picture, Sprite, SpriteHit, covers, draw};
 use forest_soup::{Camera, Projection};
 use forest_views::{
     Blend, COVER, Found, Hit, Lookup, PICK, Ray, Texels, ViewSampler, ViewsBlock, views,
@@ -46,12 +48,18 @@ impl<'a> ViewsLevel<'a> {
     }
 
     /// Draws the tree as `camera` sees it.
-    pub fn draw(&self, camera: &Camera, lookup: Lookup, style: &Style) -> (Picture, ViewsDrawn) {
+    pub fn draw<'l>(
+        &self,
+        camera: &Camera,
+        lookup: Lookup,
+        lit: impl Into<Lit<'l>>,
+    ) -> (Picture, ViewsDrawn) {
+        let lit = lit.into();
         let chosen = views(self.block, camera, lookup);
-        let impostor = Arc::new(Impostor::new(self, camera, lookup, chosen, style.light));
+        let impostor = Arc::new(Impostor::new(self, camera, lookup, chosen, lit));
         let mut list = DisplayList::default();
         list.sprite(impostor);
-        (draw(&list, camera, style), self.drawn(lookup, &chosen))
+        (draw(&list, camera, &lit.style), self.drawn(lookup, &chosen))
     }
 
     fn drawn(&self, lookup: Lookup, chosen: &Blend) -> ViewsDrawn {
@@ -74,8 +82,11 @@ struct Impostor<'a> {
     pixels: (IVec2, IVec2),
     /// Depth of the front of the ball that holds the tree.
     nearest: f64,
-    light: Light,
+    lit: Lit<'a>,
     half_diagonal: f64,
+    center: DVec3,
+    /// The views know what they see of the sky.
+    own_sky: bool,
 }
 
 impl<'a> Impostor<'a> {
@@ -84,7 +95,7 @@ impl<'a> Impostor<'a> {
         camera: &'a Camera,
         lookup: Lookup,
         chosen: Blend,
-        light: Light,
+        lit: Lit<'a>,
     ) -> Self {
         let header = &level.block.header;
         let center = level.block.center();
@@ -104,8 +115,10 @@ impl<'a> Impostor<'a> {
             eye: (camera.eye - center) / header.half,
             pixels: level.block.pixels(camera, level.level),
             nearest: depth - header.radius,
-            light,
+            lit,
             half_diagonal: level.block.half_diagonal(),
+            center,
+            own_sky: header.channels.sky,
         }
     }
 
@@ -183,8 +196,7 @@ impl Sprite for Impostor<'_> {
         let ray = self.ray(x, y);
         let hit = self.find(&ray, grid)?;
         let at = ray.origin + ray.direction * hit.distance;
-        let place = (at - self.eye) * self.half;
-        let depth = place.dot(self.camera.forward);
+        let depth = ((at - self.eye) * self.half).dot(self.camera.forward);
         let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
         if perspective && depth <= 0.0 {
             return None;
@@ -192,7 +204,10 @@ impl Sprite for Impostor<'_> {
         // On the side that is seen: views a few degrees off may see the other.
         let normal = hit.normal;
         let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-        let sunlit = self.light.seen(at * self.half, self.half_diagonal);
-        Some(SpriteHit { depth, rgb: hit.rgb, normal: normal.as_vec3(), sunlit, sky: hit.sky })
+        let place = self.center + at * self.half;
+        let [sunlit, skylit] = self.lit.seen(place, self.center, self.half_diagonal, Gain::VIEWS);
+        let sky = if self.own_sky { hit.sky } else { skylit };
+        let scattered = self.lit.all_ways();
+        Some(SpriteHit { depth, rgb: hit.rgb, normal: normal.as_vec3(), scattered, sunlit, sky })
     }
 }

@@ -1,7 +1,9 @@
 //! The volume representation: billboards of cells, sorted and blended.
 
+use crate::lit::Lit;
+use forest_foliage::Gain;
 use forest_pack::PackError;
-use forest_raster::{Layer, Light, Picture, Style, composite};
+use forest_raster::{Layer, Picture, composite};
 use forest_soup::{Camera, srgb8_to_linear};
 use forest_volume::{
     Blending, CameraShare, Detail, Item, LEAST_THROUGH, Selection, VolumeBlock, select,
@@ -43,26 +45,27 @@ impl<'a> VolumeScene<'a> {
 
     /// Draws the tree as `camera` sees it. Under a sun it is lit as leaves that face all ways
     /// ([`forest_raster::scattered`]), by the estimate of [`forest_raster::Sun::seen`]; what was made of
-    /// photographs has their light in it, and is drawn as it is ([`Light::Albedo`]).
-    pub fn draw(
+    /// photographs has their light in it, and is drawn as it is ([`forest_raster::Light::Albedo`]).
+    pub fn draw<'l>(
         &self,
         camera: &Camera,
         detail: Detail,
         blending: Blending,
-        style: &Style,
+        lit: impl Into<Lit<'l>>,
     ) -> (Picture, VolumeDrawn) {
+        let lit = lit.into();
         let selection = select(self.block, camera, detail);
         let layers: Vec<Billboard> = selection
             .items
             .iter()
-            .filter_map(|item| self.layer(camera, &selection, item, blending, style.light))
+            .filter_map(|item| self.layer(camera, &selection, item, blending, &lit))
             .collect();
         let billboards = layers.iter().map(|l| l.faces.iter().flatten().count() as u64).sum();
         let header = &self.block.header;
         let bytes = billboards as f64 * self.block.billboard_bytes()
             + header.coding.atlas_bytes(header.texels) as f64;
         let drawn = VolumeDrawn { cells: selection.items.len() as u64, billboards, bytes };
-        (composite(&layers, camera, style.sampling), drawn)
+        (composite(&layers, camera, lit.style.sampling), drawn)
     }
 
     fn layer(
@@ -71,14 +74,15 @@ impl<'a> VolumeScene<'a> {
         selection: &Selection,
         item: &Item,
         blending: Blending,
-        light: Light,
+        lit: &Lit,
     ) -> Option<Billboard<'_>> {
         let lattice = self.block.lattice();
         let node = &self.block.nodes[item.level as usize][item.node as usize];
         let center = lattice.center(item.level, node.place());
         let (x, y, depth) = camera.project(center);
         let [min, max] = self.block.header.bounds.map(DVec3::from_array);
-        let sunlit = light.seen(center - 0.5 * (min + max), 0.5 * min.distance(max));
+        let (middle, half_diagonal) = (0.5 * (min + max), 0.5 * min.distance(max));
+        let [sunlit, skylit] = lit.seen(center, middle, half_diagonal, Gain::VOLUME);
         let scale = camera.pixels_per_unit(depth);
         let mut faces = [None; 2];
         for (face, chosen) in faces.iter_mut().zip(&selection.cameras) {
@@ -93,7 +97,7 @@ impl<'a> VolumeScene<'a> {
             texels: self.block.header.texels,
             weight: item.weight,
             blending,
-            light: light.scattered(camera.to_eye(center), sunlit, 1.0),
+            light: lit.style.light.scattered(camera.to_eye(center), sunlit, skylit),
         })
     }
 

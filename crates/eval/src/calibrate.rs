@@ -178,7 +178,7 @@ fn coverage_error(
         .iter()
         .map(|view| {
             let camera = truth.frame.camera(view, HEIGHT, side);
-            let (picture, _) = draw_points(block, None, &camera, &thresholds, &STYLE);
+            let (picture, _) = draw_points(block, None, &camera, &thresholds, STYLE);
             picture.mean_coverage()
         })
         .sum();

@@ -227,7 +227,7 @@ impl Contender<'_> {
             (Way::Volume { scene, .. }, Knob::Volume { level }) => {
                 let detail = Detail::Level(level);
                 let (picture, drawn) =
-                    scene.draw(camera, detail, Blending::Shares, &style.sampling.into());
+                    scene.draw(camera, detail, Blending::Shares, Style::from(style.sampling));
                 let (primitives, bytes) = (drawn.billboards as f64, drawn.bytes);
                 (picture, Cost { primitives, bytes, select_ns: None, render_ms: None })
             }

@@ -2,7 +2,7 @@
 
 use crate::error::EvalError;
 use forest_draw::VolumeScene;
-use forest_raster::{Picture, Sampling};
+use forest_raster::{Picture, Sampling, Style};
 use forest_soup::{Camera, Photograph, srgb8_to_linear};
 use forest_volume::{Blending, Detail, VolumeBlock};
 use serde::Serialize;
@@ -67,7 +67,7 @@ pub fn matte_errors(block: &VolumeBlock, photos: &[Photograph]) -> Result<MatteE
 /// The volume as a photograph's camera sees it.
 pub fn drawn(scene: &VolumeScene, camera: &Camera) -> Picture {
     let sampling = Sampling { side: 4, seed: 1 };
-    scene.draw(camera, Detail::PIXEL, Blending::Shares, &sampling.into()).0
+    scene.draw(camera, Detail::PIXEL, Blending::Shares, Style::from(sampling)).0
 }
 
 fn compare(photo: &Photograph, drawn: &Picture) -> MatteErrors {

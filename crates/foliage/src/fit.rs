@@ -6,6 +6,7 @@
 //! for which the mean light of a few pictures is that of the truth (docs/LIGHT.md).
 
 use crate::crown::CrownLight;
+use crate::density::Density;
 use forest_raster::{
     Light, Picture, RayScene, Sampling, ShadowMap, Style, Sun, Surfaces, rasterize,
     rasterize_shadowed,
@@ -25,7 +26,7 @@ const SAMPLES: u32 = 2;
 const WEIGHTS: std::ops::RangeInclusive<f64> = 0.25..=1.5;
 
 /// Suns by which the light on crowns is fitted, all around the eye.
-const CROWN_SUNS: u32 = 14;
+const CROWN_SUNS: u32 = 20;
 
 /// Views by which the size of cards is fitted.
 const COVER_VIEWS: u32 = 8;
@@ -37,7 +38,7 @@ pub(crate) struct Brightness {
     light: Vec<[f64; 2]>,
     /// Of all pictures together, in pixels.
     coverage: f64,
-    crown: Vec<Sample>,
+    crown: CrownLight,
 }
 
 /// Light of a picture in sunlight and in skylight: sums over its pixels.
@@ -47,7 +48,7 @@ pub(crate) struct Sample {
     pub(crate) to_eye: DVec3,
     /// With shadows.
     pub(crate) truth: [f64; 2],
-    /// Without.
+    /// By what comes through the crown to each place.
     pub(crate) open: [f64; 2],
 }
 
@@ -66,7 +67,7 @@ fn setting(i: u32, bounds: [DVec3; 2]) -> (DVec3, Camera) {
 /// As many suns as there may be at each angle from the eye, at several heights.
 fn crown_setting(i: u32, bounds: [DVec3; 2]) -> (DVec3, Camera) {
     let (step, side) = (f64::from(i), if i.is_multiple_of(2) { 1.0 } else { -1.0 });
-    let eye = [step * 107.0, 10.0];
+    let eye = [step * 107.0, [5.0, 15.0, 30.0, 50.0][i as usize % 4]];
     let around = side * step * 180.0 / f64::from(CROWN_SUNS - 1);
     let pitch = [20.0, 35.0, 60.0][i as usize % 3];
     (direction(eye[0] + around, pitch), Camera::around(bounds, eye, None, [SIDE; 2]))
@@ -100,6 +101,27 @@ fn mean(picture: &Picture) -> f64 {
     picture.pixels.iter().map(|p| f64::from(luminance([p[0], p[1], p[2]]))).sum()
 }
 
+/// [`mean`] of a picture of which a share `through` of the light comes through to each place.
+fn mean_through(
+    soup: &TriangleSoup,
+    surfaces: &Surfaces,
+    camera: &Camera,
+    light: Light,
+    through: &dyn Fn(DVec3) -> f64,
+) -> f64 {
+    // A sample for a pixel, whose place is known.
+    let camera = Camera { width: SIDE * SAMPLES, height: SIDE * SAMPLES, ..*camera };
+    let style = Style { sampling: Sampling::MIDDLE, light };
+    let picture = rasterize(soup, surfaces, &camera, &style);
+    let pixels = (0..).zip(picture.pixels.iter().zip(&picture.depth));
+    let seen = pixels.filter(|(_, (_, depth))| depth.is_finite()).map(|(i, (p, depth))| {
+        let [x, y] = [i % camera.width, i / camera.width].map(|v| f64::from(v) + 0.5);
+        let place = camera.unproject(x, y, f64::from(*depth));
+        f64::from(luminance([p[0], p[1], p[2]])) * through(place)
+    });
+    seen.sum::<f64>() / f64::from(SAMPLES * SAMPLES)
+}
+
 impl Brightness {
     /// Of `soup`, whose materials `surfaces` holds.
     pub(crate) fn of(soup: &TriangleSoup, surfaces: &Surfaces) -> Self {
@@ -113,19 +135,26 @@ impl Brightness {
         let plain = |m: &Material| Material { translucency: 1.0, ..m.clone() };
         let plain: Vec<Material> = soup.materials.iter().map(plain).collect();
         let plain = Surfaces::new(&plain, &soup.textures);
+        let density = Density::of(soup, surfaces);
         let crown = |i: u32| {
             let (to_sun, camera) = crown_setting(i, bounds);
-            let open = styles(to_sun).map(|s| mean(&rasterize(soup, &plain, &camera, &s)));
+            let shade = density.shade(to_sun);
+            let [sun, sky] = styles(to_sun);
+            let open = [(0, sun), (1, sky)].map(|(k, style)| {
+                let through = |place| f64::from(shade.at(place)[k]);
+                mean_through(soup, &plain, &camera, style.light, &through)
+            });
             let to_eye = camera.to_eye(0.5 * (bounds[0] + bounds[1]));
             Sample { to_sun, to_eye, truth: truth(&(to_sun, camera)), open }
         };
         let views = cover_views(bounds);
         let coverage = views.map(|camera| covered(soup, surfaces, &camera)).sum();
+        let samples: Vec<Sample> = (0..CROWN_SUNS).map(crown).collect();
         Self {
             bounds,
             coverage,
             light: (0..SUNS).map(|i| truth(&setting(i, bounds))).collect(),
-            crown: (0..CROWN_SUNS).map(crown).collect(),
+            crown: CrownLight::fit(density, &samples),
         }
     }
 
@@ -136,8 +165,8 @@ impl Brightness {
     }
 
     /// The light on representations without shadow maps.
-    pub(crate) fn crown(&self) -> CrownLight {
-        CrownLight::fit(&self.crown)
+    pub(crate) fn crown(self) -> CrownLight {
+        self.crown
     }
 
     /// Weights of sun and sky for the last of `level`'s materials, so that it is as bright in the mean.

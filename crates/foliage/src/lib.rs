@@ -41,6 +41,7 @@ mod block;
 mod branch;
 mod cover;
 mod crown;
+mod density;
 mod dictionary;
 mod error;
 mod fit;
@@ -68,7 +69,8 @@ mod wood_graph;
 
 pub use bake::{BakeReport, bake};
 pub use block::{FoliageBlock, Mip, Posed};
-pub use crown::CrownLight;
+pub use crown::{ALL_WAYS, CrownLight, Gain};
+pub use density::CrownShade;
 pub use error::FoliageError;
 pub use header::{DICTIONARY, Draw, FoliageHeader, LevelHeader, VertexRecord, WoodWay};
 pub use options::FoliageOptions;

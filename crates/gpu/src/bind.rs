@@ -14,6 +14,7 @@ pub(crate) enum Kind {
     Write,
     Texture,
     TextureArray,
+    Texture3d,
 }
 
 /// The layout of a group whose binding number i is `kinds[i]`.
@@ -40,6 +41,7 @@ pub(crate) fn layout(
                 Kind::Write => buffer(BufferBindingType::Storage { read_only: false }),
                 Kind::Texture => texture(TextureViewDimension::D2),
                 Kind::TextureArray => texture(TextureViewDimension::D2Array),
+                Kind::Texture3d => texture(TextureViewDimension::D3),
             },
             count: None,
         })

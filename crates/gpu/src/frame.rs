@@ -1,5 +1,6 @@
 //! What a picture is made of: the camera, the light, and the layers.
 
+use crate::shade::ShadeModel;
 use bytemuck::{Pod, Zeroable};
 use forest_foliage::{CrownLight, Sway, Wind};
 use forest_points::Thresholds;
@@ -93,6 +94,8 @@ pub(crate) struct FrameUniform {
     relit: u32,
     crown: [f32; 2],
     zero: [f32; 2],
+    shade_low: [f32; 3],
+    shade_scale: f32,
 }
 
 impl FrameUniform {
@@ -142,13 +145,18 @@ impl FrameUniform {
         Self { lean: sway.lean.to_array(), foot, ..self }
     }
 
-    /// Of a crown whose shares of the light are known, seen from `to_eye`.
-    pub(crate) fn with_crown(self, crown: &CrownLight, light: &Light, to_eye: DVec3) -> Self {
-        let sunlit = match light {
-            Light::Sun(sun) => crown.sunlit(sun.to_sun, to_eye),
-            Light::Albedo => 1.0,
-        };
-        Self { crown: [sunlit, crown.sky], relit: 1, ..self }
+    /// Of a crown before `camera`, whose middle sees it in direction `to_eye`, under the sun of `shade`.
+    pub(crate) fn with_crown(
+        self,
+        crown: &CrownLight,
+        shade: &ShadeModel,
+        to_eye: DVec3,
+        camera: &Camera,
+    ) -> Self {
+        let seen = [crown.sunlit(shade.to_sun, to_eye), crown.skylit(to_eye)];
+        let shade_low = (shade.low - camera.eye).as_vec3().to_array();
+        let shade_scale = (1.0 / shade.cell) as f32;
+        Self { crown: seen, relit: 1, shade_low, shade_scale, ..self }
     }
 
     /// Of points that bend with branches whose zero is `root` in the world.

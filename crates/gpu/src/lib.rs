@@ -55,6 +55,7 @@ mod pipeline;
 mod points;
 mod present;
 mod renderer;
+mod shade;
 mod shader;
 mod sheet;
 mod target;

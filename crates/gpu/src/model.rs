@@ -6,6 +6,7 @@ use crate::foliage::FoliageModel;
 use crate::frame::{Layer, Stage, What};
 use crate::points::PointsModel;
 use crate::renderer::Renderer;
+use crate::shade::ShadeModel;
 use crate::views::ViewsModel;
 use crate::volume::VolumeModel;
 use forest_foliage::sway::USUAL_LIMBER;
@@ -29,6 +30,8 @@ pub struct Model<'p> {
     measures: Option<Measures>,
     /// What of the light its crown shows.
     pub(crate) crown: Option<CrownLight>,
+    /// What comes through it, under the sun of the last frame that had one.
+    pub(crate) shade: Option<ShadeModel>,
     stage: Stage,
     bounds: [DVec3; 2],
 }
@@ -70,7 +73,18 @@ impl<'p> Model<'p> {
             let pack = pack.path().display().to_string();
             return Err(GpuError::Nothing { pack });
         };
-        Ok(Self { pack, points, views, volume, foliage, measures, crown, stage, bounds })
+        Ok(Self {
+            pack,
+            points,
+            views,
+            volume,
+            foliage,
+            measures,
+            crown,
+            shade: None,
+            stage,
+            bounds,
+        })
     }
 
     /// The pack.

@@ -8,13 +8,14 @@ use crate::foliage::FoliagePass;
 use crate::frame::{Frame, FrameUniform, What, supersampled};
 use crate::model::Model;
 use crate::points::PointsPass;
+use crate::shade::{self, ShadeModel};
 use crate::target::{Target, TargetLayouts};
 use crate::timer::Timer;
 use crate::views::ViewsPass;
 use crate::volume::VolumePass;
 use forest_foliage::{Posed, Sway};
 use wgpu::{
-    BindGroup, Buffer, BufferUsages, Color, CommandEncoder, LoadOp, Operations,
+    BindGroup, BindGroupLayout, Buffer, BufferUsages, Color, CommandEncoder, LoadOp, Operations,
     RenderPassColorAttachment, RenderPassDepthStencilAttachment, RenderPassDescriptor,
     ShaderStages, StoreOp,
 };
@@ -29,6 +30,9 @@ pub struct Renderer {
     targets: TargetLayouts,
     uniform: Buffer,
     group: BindGroup,
+    /// Of what is lit by its crown: the layout of group 0, and the group where no crown is.
+    lit: BindGroupLayout,
+    open: BindGroup,
 }
 
 /// What a picture took.
@@ -82,15 +86,20 @@ impl Renderer {
         let size = size_of::<FrameUniform>() as u64;
         let uniform = gpu.buffer("frame", size, BufferUsages::UNIFORM)?;
         let group = bind::group(&gpu.device, "frame", &layout, &[uniform.as_entire_binding()]);
+        let kinds = [Kind::Uniform, Kind::Texture3d];
+        let lit = bind::layout(&gpu.device, "lit frame", stages, &kinds);
+        let open = shade::open(gpu, &lit, &uniform);
         let targets = TargetLayouts::new(gpu);
         let renderer = Self {
-            points: PointsPass::new(gpu, &layout, &targets, options),
-            views: ViewsPass::new(gpu, &layout),
-            volume: VolumePass::new(gpu, &layout),
+            points: PointsPass::new(gpu, &lit, &targets, options),
+            views: ViewsPass::new(gpu, &lit),
+            volume: VolumePass::new(gpu, &lit),
             foliage: FoliagePass::new(gpu, &layout),
             targets,
             uniform,
             group,
+            lit,
+            open,
         };
         gpu.finish()?;
         Ok(renderer)
@@ -125,9 +134,12 @@ impl Renderer {
         let sway = model.sway(&frame.wind, posed.as_ref());
         let mut uniform = FrameUniform::new(&samples, &frame.light, model.stage());
         uniform = uniform.with_sway(&sway, &samples);
-        if let Some(crown) = &model.crown {
+        if let Some((crown, sun)) = model.crown.as_ref().zip(frame.light.sun()) {
+            let last = model.shade.take();
+            let shade = ShadeModel::follow(last, gpu, &self.lit, &self.uniform, crown, sun.to_sun);
             let to_eye = frame.camera.to_eye(model.stage().middle);
-            uniform = uniform.with_crown(crown, &frame.light, to_eye);
+            uniform = uniform.with_crown(crown, &shade, to_eye, &samples);
+            model.shade = Some(shade);
         }
         if let Some((foliage, posed)) = model.foliage.as_ref().zip(posed.as_ref()) {
             foliage.wind.prepare(gpu, posed);
@@ -155,8 +167,9 @@ impl Renderer {
         let views = model.views.as_ref().filter(|_| draws(|w| matches!(w, What::Views(..))));
         let volume = model.volume.as_ref().filter(|_| draws(|w| matches!(w, What::Volume(..))));
         let foliage = model.foliage.as_ref().filter(|_| draws(|w| matches!(w, What::Foliage(_))));
+        let lit = model.shade.as_ref().map_or(&self.open, |s| &s.group);
         if let Some(points) = points {
-            self.points.splat(encoder, &self.group, points, target);
+            self.points.splat(encoder, lit, points, target);
         }
         if let Some(foliage) = foliage {
             self.foliage.shade(encoder, foliage);
@@ -178,7 +191,7 @@ impl Renderer {
             occlusion_query_set: None,
             multiview_mask: None,
         });
-        pass.set_bind_group(0, &self.group, &[]);
+        pass.set_bind_group(0, lit, &[]);
         if let Some(points) = points {
             self.points.draw(&mut pass, points, target);
         }
@@ -186,7 +199,9 @@ impl Renderer {
             self.views.draw(&mut pass, views);
         }
         if let Some(foliage) = foliage {
+            pass.set_bind_group(0, &self.group, &[]);
             self.foliage.draw(&mut pass, foliage);
+            pass.set_bind_group(0, lit, &[]);
         }
         // Over all that is opaque.
         if let Some(volume) = volume {

@@ -2,6 +2,7 @@
 
 use crate::CHUNK;
 use crate::landscape;
+use forest_foliage::Gain;
 use forest_foliage::wind::{ALONG_STEPS, STEADY, SWINGS};
 use forest_points::{SizeCode, spheroid};
 use forest_views as views;
@@ -183,6 +184,10 @@ fn constants() -> String {
         ("HEIGHT_STEPS", forest_scene::HEIGHT_STEPS),
         ("DIFFUSE", forest_scene::DIFFUSE),
         ("DEPTH_STEPS", f64::from(forest_scene::DEPTH_STEPS)),
+        ("GAIN_POINTS", Gain::POINTS.factor().into()),
+        ("GAIN_VIEWS", Gain::VIEWS.factor().into()),
+        ("GAIN_VOLUME", Gain::VOLUME.factor().into()),
+        ("ALL_WAYS", forest_foliage::ALL_WAYS.into()),
         ("LEAST_SHARE", landscape::LEAST_SHARE),
         ("SIZE_TOP", SizeCode::LOG2_TOP),
         ("SIZES_PER_OCTAVE", SizeCode::PER_OCTAVE),

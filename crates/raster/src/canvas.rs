@@ -252,11 +252,14 @@ impl Canvas<'_> {
             sunlit *= map.seen(place());
         }
         let sun = sun.through(f.translucency);
-        let factors = match f.scattered {
-            true => sun.scattered(self.camera.to_eye(place()), sunlit, f.sky),
-            false => sun.factors(f.normal, sunlit, f.sky),
-        };
-        std::array::from_fn(|k| f.rgb[k] * factors[k])
+        let [mut all, mut one] = [[0.0; 3]; 2];
+        if f.scattered > 0.0 {
+            all = sun.scattered(self.camera.to_eye(place()), sunlit, f.sky);
+        }
+        if f.scattered < 1.0 {
+            one = sun.factors(f.normal, sunlit, f.sky);
+        }
+        std::array::from_fn(|k| f.rgb[k] * (one[k] + (all[k] - one[k]) * f.scattered))
     }
 
     fn fragment(&self, i: u32, x: f64, y: f64, grid: (u32, u32)) -> Fragment {
@@ -265,8 +268,10 @@ impl Canvas<'_> {
             // An ellipse comes lit.
             Thing::Ellipse(e) => Fragment { normal: e.normal, ..Fragment::unlit(e.rgb) },
             Thing::Sprite(s) => match s.sample(x, y, grid) {
-                Some(SpriteHit { rgb, normal, sunlit, sky, .. }) => {
-                    Fragment { normal, unlit: false, sunlit, sky, ..Fragment::unlit(rgb) }
+                Some(hit) => {
+                    let SpriteHit { rgb, normal, scattered, sunlit, sky, .. } = hit;
+                    let plain = Fragment::unlit(rgb);
+                    Fragment { normal, unlit: false, scattered, sunlit, sky, ..plain }
                 }
                 // The same answer as before: it was a hit.
                 None => Fragment::unlit([0.0; 3]),

@@ -49,6 +49,14 @@ impl Light {
         self.factors(normal, 1.0, 1.0)
     }
 
+    /// The sun, if there is one.
+    pub fn sun(&self) -> Option<&Sun> {
+        match self {
+            Light::Albedo => None,
+            Light::Sun(sun) => Some(sun),
+        }
+    }
+
     /// [`Sun::seen`]; 1 without a sun.
     pub fn seen(&self, off: DVec3, half_diagonal: f64) -> f32 {
         match self {

@@ -222,8 +222,8 @@ pub(crate) struct Fragment {
     /// Towards the eye.
     pub(crate) normal: Vec3,
     pub(crate) unlit: bool,
-    /// It faces all ways.
-    pub(crate) scattered: bool,
+    /// Share of it that faces all ways.
+    pub(crate) scattered: f32,
     /// Share of the light's translucency.
     pub(crate) translucency: f32,
     /// Shadow maps shade it.
@@ -237,7 +237,7 @@ pub(crate) struct Fragment {
 impl Fragment {
     /// A colour as it is.
     pub(crate) fn unlit(rgb: [f32; 3]) -> Self {
-        let (unlit, scattered, shadowed) = (true, false, false);
+        let (unlit, scattered, shadowed) = (true, 0.0, false);
         let [translucency, sunlit, sky] = [1.0; 3];
         Self { rgb, normal: Vec3::ZERO, unlit, scattered, translucency, shadowed, sunlit, sky }
     }
@@ -338,7 +338,7 @@ impl<'a> Triangle<'a> {
                 _ => normal,
             },
             unlit: self.surface.is_unlit(),
-            scattered: self.surface.is_scattered(),
+            scattered: f32::from(self.surface.is_scattered()),
             translucency: self.surface.translucency(),
             shadowed: true,
             sunlit: self.sunlit[0] * w[0] + self.sunlit[1] * w[1] + self.sunlit[2] * w[2],

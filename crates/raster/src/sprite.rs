@@ -11,6 +11,8 @@ pub struct SpriteHit {
     pub rgb: [f32; 3],
     /// Unit normal on the side that is seen.
     pub normal: Vec3,
+    /// Share of it that faces all ways ([`crate::scattered`]), in `0..=1`; the rest is turned by the normal.
+    pub scattered: f32,
     /// Share of the sun that is estimated to be seen from there ([`crate::Sun::seen`]).
     pub sunlit: f32,
     /// Share of the sky that is seen from there.

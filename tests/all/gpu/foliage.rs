@@ -3,11 +3,9 @@
 
 use super::{Device, SIDE, assert_same, cameras, thresholds, tree, with_bumps};
 use forest_draw::{
-    FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
+    CrownStyle, FoliageScene, ViewsLevel, VolumeScene, draw_bent_points, draw_points, read_surfaces,
 };
-use forest_foliage::{
-    BentPoints, CrownLight, FoliageBlock, FoliageOptions, PointsWind, Pose, Wind,
-};
+use forest_foliage::{BentPoints, FoliageBlock, FoliageOptions, PointsWind, Pose, Wind};
 use forest_gpu::{Frame, Layer, Model, Options, What};
 use forest_points::{BakeOptions, PointsBlock, Thresholds};
 use forest_raster::{Light, Sampling, Style};
@@ -69,15 +67,15 @@ fn bent_points_are_those_of_draw() {
     let gale = Wind { strength: 1.0, time: 2.2, ..Wind::default() };
     let pose = Pose::new(foliage.branches, &gale, 0.0);
     let bent = BentPoints::new(&foliage, &wind, &pose);
-    let crown = CrownLight::read(&pack).unwrap().unwrap();
+    let style = Style { sampling: Sampling::MIDDLE, light: Light::MORNING };
+    let on_crown = CrownStyle::read(&pack, &style).unwrap();
     let cuts = [thresholds(1.0, 16.0, 0.0), Thresholds::TRIANGLES, thresholds(900.0, 1e9, 0.0)];
     for (c, camera) in cameras(model.bounds()).iter().enumerate() {
         let cut = &cuts[c % 3];
-        let light = crown.light(Light::MORNING, camera.to_eye(block.middle()));
-        let style = Style { sampling: Sampling::MIDDLE, light };
+        let lit = on_crown.seen_from(camera.to_eye(block.middle()));
         let surfaces = surfaces.as_ref();
-        let (cpu, _) = draw_bent_points(&block, surfaces, camera, cut, &style, &bent);
-        let (still, _) = draw_points(&block, surfaces, camera, cut, &style);
+        let (cpu, _) = draw_bent_points(&block, surfaces, camera, cut, lit, &bent);
+        let (still, _) = draw_points(&block, surfaces, camera, cut, lit);
         assert!(rmse(&cpu, &still) > 0.05, "it moves");
         let layers = [Layer::whole(What::Points(*cut))];
         let frame = Frame { camera: *camera, light: Light::MORNING, wind: gale, layers: &layers };
@@ -114,18 +112,16 @@ fn the_light_on_a_crown_is_that_of_draw() {
         let views = ViewsLevel::read(&views_block, 0).unwrap();
         let volume_block = VolumeBlock::open(&pack).unwrap();
         let volume = VolumeScene::read(&volume_block).unwrap();
-        let crown = CrownLight::read(&pack).unwrap().unwrap();
+        let style = Style { sampling: Sampling::MIDDLE, light };
+        let on_crown = CrownStyle::read(&pack, &style).unwrap();
         for (c, camera) in cameras(model.bounds())[..4].iter().enumerate() {
-            let to_eye = camera.to_eye(points.middle());
-            let style = |light| Style { sampling: Sampling::MIDDLE, light };
-            let lit = style(crown.light(light, to_eye));
-            let on_views = if sky { style(crown.sunlight(light, to_eye)) } else { lit };
+            let lit = on_crown.seen_from(camera.to_eye(points.middle()));
             let cut = thresholds(1.0, 16.0, 0.0);
             let (detail, blending) = (Detail::Level(4), Blending::Shares);
             for (what, cpu) in [
-                (What::Points(cut), draw_points(&points, surfaces.as_ref(), camera, &cut, &lit).0),
-                (What::Views(0, Lookup::Nearest), views.draw(camera, Lookup::Nearest, &on_views).0),
-                (What::Volume(detail, blending), volume.draw(camera, detail, blending, &lit).0),
+                (What::Points(cut), draw_points(&points, surfaces.as_ref(), camera, &cut, lit).0),
+                (What::Views(0, Lookup::Nearest), views.draw(camera, Lookup::Nearest, lit).0),
+                (What::Volume(detail, blending), volume.draw(camera, detail, blending, lit).0),
             ] {
                 let gpu = device.draw(&mut model, camera, light, &[Layer::whole(what)]);
                 assert_same(&format!("crown-{sky}-{c}-{}", name(&what)), &gpu, &cpu);

@@ -1,8 +1,8 @@
 //! Points, views and volumes are drawn as the CPU draws them, by every way that a device has.
 
 use super::{Device, assert_same, cameras, self_shadowed, thresholds, tree};
-use forest_draw::{ViewsLevel, VolumeScene, draw_points, read_surfaces};
-use forest_foliage::{CrownLight, Wind};
+use forest_draw::{CrownStyle, ViewsLevel, VolumeScene, draw_points, read_surfaces};
+use forest_foliage::Wind;
 use forest_gpu::{
     Frame, Gpu, Layer, Look, Model, Options, Renderer, What, adapters, instance, read_picture,
     read_samples,
@@ -24,15 +24,14 @@ fn points_are_the_same(name: &str, pack: &Pack, cuts: &[Thresholds]) {
     let mut model = Model::load(&device.gpu, &device.renderer, pack).unwrap();
     let block = PointsBlock::open(pack).unwrap();
     let surfaces = read_surfaces(pack, &block).unwrap();
-    let crown = CrownLight::read(pack).unwrap();
     for (c, camera) in cameras(model.bounds()).iter().enumerate() {
         let to_eye = camera.to_eye(block.middle());
         for (t, thresholds) in cuts.iter().enumerate() {
             for (l, light) in [Light::Albedo, self_shadowed()].into_iter().enumerate() {
-                let lit = crown.map_or(light, |crown| crown.light(light, to_eye));
-                let style = Style { sampling: Sampling::MIDDLE, light: lit };
-                let (cpu, cost) =
-                    draw_points(&block, surfaces.as_ref(), camera, thresholds, &style);
+                let style = Style { sampling: Sampling::MIDDLE, light };
+                let on_crown = CrownStyle::read(pack, &style).unwrap();
+                let lit = on_crown.seen_from(to_eye);
+                let (cpu, cost) = draw_points(&block, surfaces.as_ref(), camera, thresholds, lit);
                 let layers = [Layer::whole(What::Points(*thresholds))];
                 let (gpu, drawn) = device.draw_counted(&mut model, camera, light, &layers);
                 assert!(drawn.points >= cost.points, "{drawn:?} {cost:?}");
@@ -132,7 +131,7 @@ fn views_are_the_same(name: &str, options: &ViewsOptions) {
         for lookup in Lookup::ALL {
             for (level, light) in [(0, self_shadowed()), (1, Light::Albedo)] {
                 let style = Style { sampling: Sampling::MIDDLE, light };
-                let (cpu, cost) = levels[level].draw(camera, lookup, &style);
+                let (cpu, cost) = levels[level].draw(camera, lookup, style);
                 let layers = [Layer::whole(What::Views(2 * level, lookup))];
                 let (gpu, drawn) = device.draw_counted(&mut model, camera, light, &layers);
                 assert_eq!((drawn.views, drawn.bytes), (cost.views, cost.bytes));
@@ -178,7 +177,8 @@ fn volumes_are_the_same(name: &str, options: &VolumeOptions, codebook: Option<&C
     for (c, camera) in cameras(model.bounds()).iter().enumerate() {
         for (d, detail) in details.into_iter().enumerate() {
             for blending in [Blending::Shares, Blending::Over] {
-                let (cpu, cost) = scene.draw(camera, detail, blending, &Sampling::MIDDLE.into());
+                let (cpu, cost) =
+                    scene.draw(camera, detail, blending, Style::from(Sampling::MIDDLE));
                 let layers = [Layer::whole(What::Volume(detail, blending))];
                 let (gpu, drawn) = device.draw_counted(&mut model, camera, Light::Albedo, &layers);
                 assert_eq!(drawn.cells, cost.cells);
@@ -227,8 +227,8 @@ fn samples_on_the_edges_of_cells_do_not_fall_through() {
         let alpha = |x: usize| (0..512).map(|y| f64::from(picture.pixels[y * 512 + x][3])).sum();
         (0..512).map(alpha).collect()
     };
-    let style = Sampling::MIDDLE.into();
-    let cpu = |camera| scene.draw(camera, Detail::PIXEL, Blending::Shares, &style).0;
+    let style = Style::from(Sampling::MIDDLE);
+    let cpu = |camera| scene.draw(camera, Detail::PIXEL, Blending::Shares, style).0;
     let layers = [Layer::whole(What::Volume(Detail::PIXEL, Blending::Shares))];
     let gpu = device.draw(&mut model, &camera, Light::Albedo, &layers);
     // The crown's columns: none is emptier than both of its neighbours by much more than where samples

@@ -55,7 +55,7 @@ pub(crate) fn measure(
                 depth_bias: PixelArea(0.0),
             };
             let (picture, drawn) =
-                draw_points(&block, None, &camera, &thresholds, &Style::default());
+                draw_points(&block, None, &camera, &thresholds, Style::default());
             let error = picture.mean_coverage() / source - 1.0;
             row.points += drawn.points / u64::from(VIEWS);
             row.error += error / f64::from(VIEWS);

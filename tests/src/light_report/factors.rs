@@ -1,8 +1,8 @@
 //! Factors of the light on the leaves of a tree, pixel by pixel, and the truth.
 
 use crate::density::Density;
-use anyhow::Result;
-use forest_foliage::{FoliageBlock, FoliageOptions, Part, Parts};
+use anyhow::{Context, Result};
+use forest_foliage::{CrownLight, CrownShade, FoliageBlock, FoliageOptions, Part, Parts};
 use forest_import::{Block, Limits};
 use forest_points::record::decode_axis;
 use forest_raster::{
@@ -17,7 +17,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Names of the factors; [`Samples::rows`] has them in this order.
-pub(crate) const FACTORS: [&str; 5] = ["vertex", "density", "shadow", "occlusion", "hotspot"];
+pub(crate) const FACTORS: [&str; 6] =
+    ["vertex", "density", "shadow", "occlusion", "through", "hotspot"];
 
 /// A pixel under a sun: factors, then the truth.
 pub(crate) type Row = [f64; FACTORS.len() + 1];
@@ -68,7 +69,8 @@ impl Samples {
         let pack = open(&bake_foliage(&soup, &FoliageOptions::default())?.0)?;
         let foliage = FoliageBlock::open(&pack)?;
         let tree = Tree::new(&soup, &foliage)?;
-        let rows = suns().into_iter().map(|sun| tree.rows(sun)).collect();
+        let crown = CrownLight::read(&pack)?.context("the light on its crown")?;
+        let rows = suns().into_iter().map(|sun| tree.rows(sun, &crown.shade(sun))).collect();
         Ok(Self { rows, sunlit: foliage.header.levels[0].sunlit })
     }
 }
@@ -101,17 +103,19 @@ struct View {
 const FINE: u32 = 4;
 
 impl View {
-    /// The shadow test and the occlusion factor of a pixel: means over places in it.
+    /// The shadow test, the occlusion factor and what comes through the crown to a pixel: means over places
+    /// in it.
     fn shadow(
         &self,
         shadows: &ShadowMap,
         map: &Picture,
         from_sun: &Camera,
+        shade: &CrownShade,
         i: usize,
         reach: f64,
-    ) -> [f64; 2] {
+    ) -> [f64; 3] {
         let (x, y) = (i as u32 % SIDE * FINE, i as u32 / SIDE * FINE);
-        let mut sum = [0.0; 3];
+        let mut sum = [0.0; 4];
         for (dx, dy) in (0..FINE * FINE).map(|k| (k % FINE, k / FINE)) {
             let at = (y + dy) * SIDE * FINE + x + dx;
             let depth = f64::from(self.fine_depth[at as usize]);
@@ -120,10 +124,11 @@ impl View {
                 let behind = behind(map, from_sun, place) / reach;
                 sum[0] += f64::from(shadows.seen(place));
                 sum[1] += (-(behind - BIAS).max(0.0) / FADE).exp();
-                sum[2] += 1.0;
+                sum[2] += f64::from(shade.at(place)[0]);
+                sum[3] += 1.0;
             }
         }
-        [sum[0], sum[1]].map(|s| s / f64::max(sum[2], 1.0))
+        [sum[0], sum[1], sum[2]].map(|s| s / f64::max(sum[3], 1.0))
     }
 }
 
@@ -177,7 +182,7 @@ impl<'a> Tree<'a> {
     }
 
     /// All leafy pixels of all views under a sun.
-    fn rows(&self, to_sun: DVec3) -> Vec<Row> {
+    fn rows(&self, to_sun: DVec3, shade: &CrownShade) -> Vec<Row> {
         let sun = Sun { to_sun, sun: [1.0; 3], sky: [0.0; 3], translucency: 1.0, darkest: 1.0 };
         let truth = RayScene::new(self.soup, &self.surfaces);
         let [min, max] = self.bounds;
@@ -203,12 +208,14 @@ impl<'a> Tree<'a> {
                 let normal = DVec3::from_array(
                     rgb(&v.normals, i).map(|c| f64::from(c / covers) * 2.0 - 1.0),
                 );
-                let [shadow, occlusion] = v.shadow(&shadows, &map, &from_sun, i, reach);
+                let [shadow, occlusion, through] =
+                    v.shadow(&shadows, &map, &from_sun, shade, i, reach);
                 let row: Row = [
                     normal.normalize_or_zero().dot(to_sun),
                     f64::from(v.openness.pixels[i][0] / v.openness.pixels[i][3]),
                     shadow,
                     occlusion,
+                    through,
                     hotspot,
                     f64::from(luminance(rgb(&lit, i)) / base),
                 ];

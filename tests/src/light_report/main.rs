@@ -54,7 +54,8 @@ Written by `make light`. Truth: sunlight alone on leaves that shine through, by 
 16 suns, three views, trees of 128 pixels; means over blocks of 8 × 8 pixels that leaves cover. Factors are taken on the foliage's finest
 level: *vertex* is the cosine of the sun to a normal that points away from the middle of the crown's box, *density* the share of light
 that comes through the leaves around, *shadow* the test of a shadow map of the foliage, *occlusion* a fade by the depth behind what
-it shows, *hotspot* the closed form of leaves that face all ways, seen and lit from two directions (`forest_raster::scattered`).
+it shows, *through* what comes through the pack's grid of the tree's density (at most 34 cells a side), by which points, views and
+volumes are lit, *hotspot* the closed form of leaves that face all ways, seen and lit from two directions (`forest_raster::scattered`).
 Weights of sums are fitted by least squares on every second sun and judged on the others; in *products* the sum is multiplied by
 the hotspot's factor. RMSE is over the mean of the truth. *Alone*: this factor and a constant; *without*: all others. *Worst sun*: the
 largest error of the mean light under one sun.
@@ -77,7 +78,7 @@ fn sets() -> Vec<(String, Vec<usize>)> {
     }
     out.push(("all".into(), all));
     out.push(("hotspot × constant".into(), vec![PRODUCT]));
-    for (i, name) in FACTORS[..4].iter().enumerate() {
+    for (i, name) in FACTORS[..FACTORS.len() - 1].iter().enumerate() {
         out.push((format!("hotspot × {name}"), vec![i, PRODUCT]));
     }
     out.push(("hotspot × (vertex, density)".into(), vec![0, 1, PRODUCT]));
@@ -120,7 +121,7 @@ fn weights(text: &mut String, all: &[(String, Samples)]) -> Result<()> {
     for (name, samples) in all {
         let rows = || samples.rows.iter().flatten();
         let truth: f64 = rows().map(|r| r[FACTORS.len()]).sum();
-        let product: f64 = rows().map(|r| r[2] * r[4]).sum();
+        let product: f64 = rows().map(|r| r[2] * r[FACTORS.len() - 1]).sum();
         let own = samples.sunlit;
         writeln!(text, "- {name}: {:.3}; the bake's {own:.3}", truth / product)?;
     }

@@ -132,11 +132,11 @@ fn by_draw(pack: &Pack, camera: &Camera, what: What) -> Result<Picture> {
         What::Points(thresholds) => {
             let block = PointsBlock::open(pack)?;
             let surfaces = read_surfaces(pack, &block)?;
-            draw_points(&block, surfaces.as_ref(), camera, &thresholds, &style).0
+            draw_points(&block, surfaces.as_ref(), camera, &thresholds, style).0
         }
         What::Views(level, lookup) => {
             let block = ViewsBlock::open(pack)?;
-            ViewsLevel::read(&block, level)?.draw(camera, lookup, &style).0
+            ViewsLevel::read(&block, level)?.draw(camera, lookup, style).0
         }
         What::Foliage(level) => {
             let block = FoliageBlock::open(pack)?;
@@ -144,7 +144,7 @@ fn by_draw(pack: &Pack, camera: &Camera, what: What) -> Result<Picture> {
         }
         What::Volume(detail, blending) => {
             let block = VolumeBlock::open(pack)?;
-            VolumeScene::read(&block)?.draw(camera, detail, blending, &style).0
+            VolumeScene::read(&block)?.draw(camera, detail, blending, style).0
         }
     })
 }

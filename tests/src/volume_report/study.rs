@@ -99,8 +99,9 @@ impl Judge<'_> {
             let side = self.truth.frame.side(f64::from(HEIGHT), 1);
             let camera = self.truth.frame.camera(view, f64::from(HEIGHT), side);
             let sampling = Sampling { side: 4, seed: 1 };
-            let [a, b] = [level, level - 1]
-                .map(|l| scene.draw(&camera, Detail::Level(l), Blending::Shares, &sampling.into()));
+            let [a, b] = [level, level - 1].map(|l| {
+                scene.draw(&camera, Detail::Level(l), Blending::Shares, Style::from(sampling))
+            });
             drawn = [drawn[0] + a.1.billboards as f64, drawn[1] + b.1.billboards as f64];
             sum += rms(&a.0, &b.0);
         }

@@ -53,7 +53,7 @@ fn picture(pack: &Pack, forward: DVec3, largest: f64, projection: Projection) ->
         largest: PixelArea(largest),
         depth_bias: PixelArea(0.0),
     };
-    draw_points(&block, Some(&surfaces), &camera, &t, &Style::default())
+    draw_points(&block, Some(&surfaces), &camera, &t, Style::default())
 }
 
 const ORTHO: Projection = Projection::Orthographic { height: 2.0 };
@@ -126,7 +126,7 @@ fn an_eye_inside_the_block_clips_what_is_behind_it() {
     let camera = Camera::new(DVec3::new(0.5, 0.5, 0.0), -DVec3::Z, projection, [32, 32]);
     let t =
         Thresholds { finest: PixelArea(0.0), largest: PixelArea(0.0), depth_bias: PixelArea(0.0) };
-    let (p, _) = draw_points(&block, Some(&surfaces), &camera, &t, &Style::default());
+    let (p, _) = draw_points(&block, Some(&surfaces), &camera, &t, Style::default());
     // The floor below the horizon, nothing above; its far edge is 5 units away, 0.5 down.
     let rows: Vec<f32> = p.pixels.chunks(32).map(|r| r[16][3]).collect();
     assert!(

@@ -34,9 +34,12 @@ struct Frame {
     root: vec3f,
     // 1 if volumes are lit: they are base colours.
     relit: u32,
-    // Shares of sun and sky that a crown shows: forest_foliage::CrownLight.
+    // Of the sun and the sky that come through a crown, what is seen: forest_foliage::CrownLight.
     crown: vec2f,
     zero: vec2f,
+    // Corner of the grid of what comes through, from the eye, and one over the side of its cells.
+    shade_low: vec3f,
+    shade_scale: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -146,6 +149,11 @@ fn light_through(through: f32, normal: vec3f, sunlit: f32, skylit: f32) -> vec3f
     let c = dot(normal, frame.to_sun);
     let direct = (max(c, 0.0) + through * frame.translucency * max(-c, 0.0)) * sunlit;
     return frame.sun * direct + frame.sky * skylit;
+}
+
+// Factor on the light of what is drawn with this gain: forest_foliage::Gain.
+fn on_crown(gain: f32) -> f32 {
+    return select(1.0, gain, frame.relit != 0u);
 }
 
 // forest_raster::scattered

@@ -68,6 +68,6 @@ fn point_color(turn: vec2f, clump: f32, index: u32, p: vec4u, at: vec2f, depth: 
     let place = unproject(at, depth);
     let axis = bent_axis(index, point_axis(turn, p));
     let normal = select(axis, -axis, dot(axis, to_eye(place)) < 0.0);
-    let seen = seen_at(place) * exp(-clump);
+    let seen = seen_at(place) * (exp(-clump) * on_crown(GAIN_POINTS));
     return vec4f(rgb * light(normal, seen.x, seen.y * skyward(normal)), 1.0);
 }

@@ -36,5 +36,5 @@ fn large_fragment(in: Quad) -> @location(0) vec4f {
     if !(contains(e, in.position.xy) && covers(id, at, e.opacity) && fades_in(cell.fade, at)) {
         discard;
     }
-    return point_color(cell.turn, cell.clump, in.place.x, p, in.position.xy, e.depth);
+    return point_color(cell.turn, cell.clump, in.place.x, p, e.center, e.depth);
 }

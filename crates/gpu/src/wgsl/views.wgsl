@@ -359,6 +359,13 @@ fn fragment(@builtin(position) position: vec4f) -> Sample {
     }
     // On the side that is seen: views a few degrees off may see the other.
     let normal = select(hit.normal, -hit.normal, dot(hit.normal, ray.direction) > 0.0);
-    let rgb = hit.rgb * light(normal, sun_seen(place), select(frame.crown.y, hit.sky, sprite.has_sky != 0u));
+    let seen = seen_at(place) * on_crown(GAIN_VIEWS);
+    let skylit = select(seen.y, hit.sky, sprite.has_sky != 0u);
+    var factors = light(normal, seen.x, skylit);
+    if frame.relit != 0u && frame.lit != 0u {
+        let direct = scattered(dot(to_eye(place), frame.to_sun), frame.translucency) * seen.x;
+        factors = mix(factors, frame.sun * direct + frame.sky * skylit, ALL_WAYS);
+    }
+    let rgb = hit.rgb * factors;
     return Sample(vec4f(rgb, 1.0), depth_value(depth));
 }

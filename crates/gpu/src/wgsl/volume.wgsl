@@ -154,8 +154,9 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     out.light = vec3f(1.0);
     if frame.relit != 0u && frame.lit != 0u {
         // The estimate is that of the tree at rest.
-        let direct = scattered(dot(to_eye(still), frame.to_sun), frame.translucency) * sun_seen(still);
-        out.light = frame.sun * direct + frame.sky * frame.crown.y;
+        let seen = seen_at(still) * on_crown(GAIN_VOLUME);
+        let direct = scattered(dot(to_eye(still), frame.to_sun), frame.translucency) * seen.x;
+        out.light = frame.sun * direct + frame.sky * seen.y;
     }
     let corner = vec2f(f32(vertex & 1u), f32(vertex >> 1u)) * 2.0 - 1.0;
     out.position = flat_clip(at.xy + corner * reach, depth_value(at.z));
